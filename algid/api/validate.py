@@ -110,8 +110,7 @@ def validate(
         known = opened(result)
         model, own = predictor_of(known, file), reused(own, known)
     gravity = model.model.gravity
-    sources = open_sources(logs, "unloaded", own, gravity)
-    survey = Recordings(sources + open_sources(loaded, "loaded", own, gravity), progress)
+    survey = Recordings(open_sources(logs, loaded, own, gravity), progress)
     survey.begin("prediction")
     found = predicted(model, survey, simulate=simulate)
     warnings = list[str]()

@@ -1,26 +1,49 @@
-"""The estimators that give a fit, on logs."""
+"""The torque's model, given or chosen by logs, and the estimators that give its fit."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
 from algid.base.names import outside, within
+from algid.base.significance import level
 from algid.estimators import robust
 from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import constrained
 from algid.estimators.excitation import undriven
-from algid.estimators.fit import Fit
-from algid.estimators.terms import Selection, TermTrial
-from algid.identification.model_choice import revised
+from algid.estimators.fit import Fit, Misfit
+from algid.estimators.hold import Hold
+from algid.estimators.terms import (
+    CHOICE,
+    Selection,
+    TermTrial,
+    has_need,
+    needs_shape,
+    plausible,
+    price,
+    select,
+)
+from algid.identification.known import model_of
 from algid.identification.passes import long_enough, problem_of
 from algid.identification.recordings import Recordings
 from algid.methods import estimator_of
-from algid.model import DELAYS, FIRST_TERMS, TERMS, Model
+from algid.model import (
+    CHOICES,
+    COLUMN_NAMES,
+    DELAYS,
+    EVERY_TERM,
+    FIRST_TERMS,
+    TERMS,
+    Model,
+    without_delay,
+)
 from algid.notices import Notice
-from algid.physics.effort import ELASTIC
+from algid.physics.effort import ELASTIC, absent, without_terms
+from algid.results import Result
 from algid.settings import Settings
 
 
@@ -40,6 +63,82 @@ class Fitted:
     survey: Recordings = field(default_factory=lambda: Recordings(()))
     settings: Settings = field(default_factory=Settings)
     chosen: Selection = field(default_factory=lambda: Selection(Model(), False))
+
+
+def choose_model(
+    survey: Recordings, settings: Settings, earlier: Result | None = None
+) -> Selection:
+    """The torque's model: set by the user, taken from an earlier result, or chosen by the logs.
+
+    The same with whether the torque is held between samples. Where logs are to tell that and do
+    not, the delay is estimated.
+
+    Raises
+    ------
+    LogError
+        If no log is long enough.
+    """
+    asked, hold_by = settings.torque_hold, _BY_SETTINGS
+    if asked == "auto" and earlier is not None:
+        asked, hold_by = Settings.of(earlier.settings).torque_hold, "parameters"
+    hold: Hold = "zoh" if asked == "zoh" else "foh"
+    if settings.chooses and earlier is not None:
+        terms = model_of(earlier).terms + within(DELAYS, earlier.parameters)
+        chosen = replace(_given(model_of(earlier), terms), chosen_by="parameters")
+        return replace(chosen, hold=hold, hold_by=hold_by)
+    by_logs = settings.torque_hold == "auto" and earlier is None and settings.delay == 0
+    by_logs &= not any(EVERY_TERM[term].timing for term in settings.terms)
+    if not (settings.chooses or by_logs or needs_shape(settings.terms)):
+        plain = Model(gravity=settings.gravity)
+        return replace(_given(plain, settings.terms), hold=hold, hold_by=hold_by)
+    with long_enough(survey):
+        chosen = _by_first_pass(survey, settings, hold)
+        if by_logs and chosen.model.lag_name is None and not (chosen.refuted and settings.chooses):
+            return _with_hold(survey, settings, chosen)
+        return replace(chosen, hold_by=hold_by)
+
+
+_BY_SETTINGS: Literal["settings", "parameters"] = "settings"
+_OF_HOLD = "kept: the logs leave open whether the torque is held, half a sample late"
+_OF_CONTROLLER = "kept: the logs leave open how late a controller that is faster than they are acts"
+
+
+def _with_hold(survey: Recordings, settings: Settings, chosen: Selection) -> Selection:
+    """The model and the hold that the logs show."""
+    late = chosen.late
+    if late is None:
+        return chosen
+    if late.hold == "zoh":
+        chosen = _by_first_pass(survey, settings, "zoh")
+    elif not late.determined and not chosen.delay:
+        why = _OF_CONTROLLER if late.faster else _OF_HOLD
+        trials = [trial for trial in chosen.trials if trial.term not in DELAYS]
+        trials += [TermTrial(term, True, np.nan, why) for term in DELAYS]
+        chosen = replace(chosen, delay=True, trials=tuple(trials))
+    return replace(chosen, hold=late.hold, hold_by="logs", late=late)
+
+
+def _by_first_pass(survey: Recordings, settings: Settings, hold: Hold) -> Selection:
+    """The model asked for with the shape of friction, or the one that logs choose, of that hold."""
+    candidates: tuple[str, ...] = ()
+    if settings.chooses and settings.delay == 0:
+        candidates = CHOICE
+    elif settings.chooses:
+        candidates = without_delay(CHOICE)
+    plain = replace(_given(Model(gravity=settings.gravity), ()), hold=hold)
+    chosen = select(
+        problem_of(survey, settings, plain),
+        without_terms(settings.effort, candidates),
+        settings.terms,
+        absent(settings.effort, COLUMN_NAMES),
+    )
+    return replace(chosen, hold=hold)
+
+
+def _given(model: Model, terms: Sequence[str]) -> Selection:
+    """The model with `terms`, of which a delay is estimated beside it."""
+    own = without_delay(terms)
+    return Selection(replace(model, terms=own), len(own) < len(terms))
 
 
 def run_fit(
@@ -174,3 +273,80 @@ def _shrunk(
         trials=tuple(TermTrial(term, True, np.nan, _SHRUNK) for term in terms),
     )
     return replace(fit, notes=notes + fit.notes), shrunken
+
+
+OVERLOOKED = 2
+"""Terms at most that the likelihood adds."""
+_BY_LIKELIHOOD = "kept: what the likelihood leaves of the torque depends on it"
+_ZERO = "left out: the fit finds it to be zero within its error"
+
+
+def revised(
+    fit: Fit, chosen: Selection, settings: Settings, refit: Callable[[Selection], Fit]
+) -> tuple[Fit, Selection]:
+    """The fit with the terms that it shows itself, where the logs chose them.
+
+    The first pass weighs by noise levels that the fit improves, and linearises elsewhere. Where the
+    likelihood is refuted, terms that its residual shows are added, if it stands with them: else
+    what the arm has is no term, or several. Of one that stands those are left out that are not
+    worth their price.
+    """
+    if chosen.chosen_by != "logs":
+        return fit, chosen
+    richer, better = chosen, fit
+    for _ in range(OVERLOOKED):
+        added = _most_evident(better.misfit, richer)
+        if added is None:
+            break
+        richer = richer.changed((added,), _BY_LIKELIHOOD, kept=True)
+        better = refit(richer)
+        if better.converged and not better.refuted:
+            fit, chosen = better, richer
+            break
+    nothing = _insignificant(chosen, fit).difference(settings.terms)
+    if nothing and not fit.refuted:
+        poorer = chosen.changed(nothing, _ZERO, kept=False)
+        other = refit(poorer)
+        if not other.refuted:
+            return other, poorer
+    return fit, chosen
+
+
+def _most_evident(misfit: Misfit | None, chosen: Selection) -> str | None:
+    """The left-out term that the likelihood's residual shows most, if its value is plausible."""
+    if misfit is None:
+        return None
+    left = {trial.term for trial in chosen.trials if not trial.kept}
+    least = level("REFUTED") / max(1, len(misfit.overlooked))
+    seen = []
+    for one in misfit.overlooked:
+        possible = one.term in left and has_need(one.term, chosen.model.terms)
+        if possible and one.p_value < least and plausible(one.values):
+            seen.append((one.p_value, one.term))
+    if not seen:
+        return None
+    return min(seen)[1]
+
+
+def _insignificant(chosen: Selection, fit: Fit) -> set[str]:
+    """Terms of the fit none of whose coefficients has t² > ln N + 2 ln T, N samples, T terms."""
+    least = np.sqrt(price(1, max(2, fit.freedom), len(CHOICE)))
+    size = dict(zip(fit.names, np.abs(fit.values) / np.maximum(fit.std, 1e-300), strict=True))
+    # the arm's constants would move without what was kept in spite of its price
+    needed = {trial.term for trial in chosen.trials if trial.kept and trial.evidence <= 0}
+    terms = set()
+    for name in CHOICES:
+        term = EVERY_TERM[name]
+        if name not in chosen.model.terms and set(term.names).isdisjoint(fit.names):
+            continue
+        if name in DELAYS and chosen.undetermined is not None:
+            continue
+        if term.sines and "y_p" in fit.shared.body:  # the payload's offset shows in them
+            continue
+        if any(EVERY_TERM[other].needs == name for other in chosen.model.terms):
+            continue
+        if name in needed:
+            continue
+        if max(size.get(parameter, 0.0) for parameter in term.names) < least:
+            terms.add(name)
+    return terms

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +36,8 @@ from algid.settings import Settings
 from algid.table4 import UNITS, UNLOADED_ROWS, finite, sums
 
 STAGE1_WINDOW = 2.0  # s
-_STAGE2_UNITS = UNITS | {"l1": "m"}
+_UNITS = PARAMETER_UNITS | UNITS
+NOTHING: FloatArray = np.zeros(0)
 STAGE1_FILE = "estimates.parquet"
 STAGE2_FILE = "loaded.parquet"
 ROWS = 1 << 17  # of a block of the series
@@ -65,7 +67,7 @@ def run_paper(
     if unloaded is not None:
         values, wander, usable = _estimate(survey, unloaded, settings, None, folder)
         k = values[: len(CONSTANT_NAMES)]
-        parameters = _named(CONSTANT_NAMES, PARAMETER_UNITS, values, usable)
+        parameters = _named(CONSTANT_NAMES, values, usable)
         if _is_no_arm(np.where(usable[: k.size], k, np.nan), wander):
             parameters = distrusted(parameters)
         if usable.all():
@@ -74,10 +76,10 @@ def run_paper(
         return Identified(parameters, {}, {}, rows)
     payload = ("m_p", "l1")
     if k is None or not np.isfinite(k).all():
-        return Identified(parameters, _weak(STAGE2_NAMES), _weak(payload), rows)
+        return Identified(parameters, _named(STAGE2_NAMES), _named(payload), rows)
     values, wander, usable = _estimate(survey, loaded, settings, k, folder)
     names = STAGE2_NAMES + ("l1", "m_p")
-    named = _named(names, _STAGE2_UNITS, values, usable)
+    named = _named(names, values, usable)
     of_payload = slice(len(STAGE2_NAMES), len(names))
     if np.any((values + FAR_BEYOND * wander)[of_payload] < 0):
         named = distrusted(named)
@@ -171,22 +173,11 @@ def _is_no_arm(k: FloatArray, wander: FloatArray) -> bool:
 
 
 def _named(
-    names: Sequence[str], units: dict[str, str], values: FloatArray, usable: NDArray[np.bool_]
+    names: Sequence[str], values: FloatArray = NOTHING, usable: NDArray[np.bool_] = NOTHING > 0
 ) -> dict[str, Estimate]:
-    """Estimates by name; those that are not usable have none."""
+    """Estimates by name; those that are not usable have none, as all have where stage 1 failed."""
     named = {}
-    for name, value, good in zip(names, values, usable, strict=False):
-        if good:
-            named[name] = Estimate(estimate=finite(value), unit=units[name])
-        else:
-            named[name] = _none(units[name])
+    for name, value, good in zip_longest(names, values[: len(names)], usable[: len(names)]):
+        weak = Estimate(estimate=None, unit=_UNITS[name], status=Status.WEAK_EXCITATION)
+        named[name] = Estimate(estimate=finite(value), unit=_UNITS[name]) if good else weak
     return named
-
-
-def _weak(names: Sequence[str]) -> dict[str, Estimate]:
-    """No estimates, where stage 1 failed."""
-    return {name: _none(_STAGE2_UNITS[name]) for name in names}
-
-
-def _none(unit: str) -> Estimate:
-    return Estimate(estimate=None, unit=unit, status=Status.WEAK_EXCITATION)

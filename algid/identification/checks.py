@@ -1,4 +1,19 @@
-"""What is checked of a fit, in one table, and notes on what its intervals leave out."""
+"""What is checked of a fit, in one table, and notes on what its intervals leave out.
+
+The moments' sine parts mean zeros of the angles, or centres of mass off the links' lines:
+
+======  =====================================  ========  =======
+symbol  name                                   shape     unit
+======  =====================================  ========  =======
+K       phasor of a moment, k + i k_s          scalar    its own
+a       its argument                           scalar    rad
+slope   ∂a/∂β                                  (Q,)      mixed
+======  =====================================  ========  =======
+
+With centres of mass turned by δ off the lines and zeros off by ε: arg K2 − arg K1 = ε1, and arg K1
+= δ2 + ε2, whose parts no torque separates. arg K4 − ε1 is where the load of joint 1 lies that
+turns with link 1.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +24,12 @@ from typing import Literal
 import numpy as np
 
 from algid import results
+from algid.arm import FloatArray
 from algid.base.significance import CERTAIN, chance, sigmas
 from algid.base.units import TORQUE
 from algid.estimators.diagnostics import (
     FAR_BEYOND,
+    bent,
     broken_bounds,
     constrained,
     length_by_constants,
@@ -20,15 +37,14 @@ from algid.estimators.diagnostics import (
 )
 from algid.estimators.excitation import contradicted, undriven
 from algid.estimators.fit import Fit
-from algid.estimators.prediction import PredictionScore, score
+from algid.estimators.prediction import PredictionScore
 from algid.estimators.robust import unshrunk
 from algid.identification.by_likelihood import Fitted
 from algid.identification.passes import problem_of
-from algid.identification.phases import phase_note
 from algid.identification.recordings import Recording
-from algid.identification.series import torque_coefficients, torque_shift
-from algid.identification.validate import prediction
-from algid.model import FIRST_TERMS, K4, RIGID
+from algid.identification.series import predictor_of_fit
+from algid.identification.validate import prediction, scores
+from algid.model import FIRST_TERMS, K1, K2, K4, RIGID, SINE_OF, SINES, phasor
 from algid.notices import Notice, Remedy, has_code
 
 STEEL, AIR = 8000.0, 1.2  # kg/m³
@@ -83,7 +99,7 @@ def _of_refuted(found: Fitted) -> Iterator[Notice]:
     fit, survey = found.fit, found.survey
     if not (fit.refuted and found.settings.chooses) or exchanged(fit):
         return
-    if any("BROKEN_BOUND" in log.origin.reading.accepted for log in survey.logs):
+    if "BROKEN_BOUND" in survey.accepted:
         return
     far = [one.bound for one in broken_bounds(fit) if (one.distance or 0.0) > FAR_BEYOND]
     if not far:
@@ -95,10 +111,7 @@ def _of_refuted(found: Fitted) -> Iterator[Notice]:
     lawful = constrained(fit)
     if not lawful.converged:
         return
-    total = PredictionScore()
-    for log in survey.logs:
-        c, shift = torque_coefficients(lawful, log.role), torque_shift(found.settings, lawful)
-        total += score(lawful.shared.model, c, survey.segments(log), shift)
+    total = sum(scores(predictor_of_fit(replace(found, fit=lawful)), survey), PredictionScore())
     predicted = prediction(total)
     if predicted is None or not predicted.unexplained(MOST):
         yield Notice("HARDLY_DRIVEN", numbers={"case": "bounds", "bounds": far})
@@ -140,10 +153,24 @@ def _of_gravity(found: Fitted) -> Iterator[Notice]:
 
 
 def _of_phases(found: Fitted) -> Iterator[Notice]:
-    """The phases of an arm whose links are not straight."""
-    phases = phase_note(found.fit)
-    if phases is not None:
-        yield phases
+    """The phases in degrees with their 95 % intervals, of an arm whose links are not straight.
+
+    A shrunk fit has every term: there the links are straight where the sine parts are together
+    consistent with nothing.
+    """
+    fit = found.fit
+    if set(SINES).isdisjoint(fit.names) or (fit.shrinkage is not None and not bent(fit)):
+        return
+    second, of_second = _argument(fit, K1)
+    numbers = {"case": "no gravity", "second": _in_degrees(fit, second, of_second)}
+    if {K2, K4} <= set(fit.names) - set(fit.absent):
+        whole, of_whole = _argument(fit, K2)
+        load, of_load = _argument(fit, K4)
+        first, of_first = whole - second, of_whole - of_second
+        numbers["case"] = "gravity"
+        numbers["first"] = _in_degrees(fit, first, of_first)
+        numbers["load"] = _in_degrees(fit, load - first, of_load - of_first)
+    yield Notice("PHASES", numbers=numbers)
 
 
 def _of_mass(found: Fitted) -> Iterator[Notice]:
@@ -297,3 +324,62 @@ def _of_hold(hold: results.TorqueHold) -> Iterator[Notice]:
         )
     elif hold.used == "zoh":
         yield Notice("TORQUE_HOLD", numbers={"case": "held", "late": 1e3 * hold.half})
+
+
+LEAST_TURN = np.radians(20.0)
+"""rad: gravity that is turned by more, beyond its interval, is no base that is not quite level."""
+LEAST_CERTAIN = 5.0  # standard deviations of k1 and of k2 that an angle between them needs
+
+
+def turn_note(fit: Fit, log: Recording) -> Notice | None:
+    """That gravity is turned against θ1 as `log` was read, with the zero that turns it back.
+
+    Where its named zeros lie within the interval of ε1, the nearest is named. None where gravity is
+    turned by less than `LEAST_TURN`, and where it may be upside down, which signs make too.
+    """
+    from algid.inspection.conventions import zeroed
+
+    names = set(fit.names) - set(fit.absent)
+    if not {K1, K2, SINE_OF[K1], SINE_OF[K2]} <= names or fit.shared.model.gravity == 0:
+        return None
+    if min(_certainty(fit, K1), _certainty(fit, K2)) < LEAST_CERTAIN:
+        return None
+    (second, of_second), (whole, of_whole) = _argument(fit, K1), _argument(fit, K2)
+    turn = float(np.remainder(whole - second + np.pi, 2 * np.pi) - np.pi)
+    half = _half(fit, of_whole - of_second)
+    if not abs(turn) - half > LEAST_TURN or abs(turn) + half >= np.pi:
+        return None
+    anyway = Remedy({"accept": "WRONG_ZERO"}, "where the arm is mounted so")
+    numbers = {"turn": float(np.degrees(turn))}
+    return Notice("WRONG_ZERO", numbers=numbers, remedies=(zeroed(log.origin, turn, half), anyway))
+
+
+def _certainty(fit: Fit, name: str) -> float:
+    """Size of the moment `name` in its standard deviations."""
+    places = [fit.names.index(name), fit.names.index(SINE_OF[name])]
+    K = fit.values[places]
+    size = float(np.linalg.norm(K))
+    variance = float(K @ fit.covariance[np.ix_(places, places)] @ K)
+    if not np.all(np.isfinite(fit.std[places])) or variance <= 0:
+        return 0.0
+    return size**2 / float(np.sqrt(variance))
+
+
+def _argument(fit: Fit, name: str) -> tuple[float, FloatArray]:
+    """Argument of the moment `name` and its slope (Q,)."""
+    K = phasor(fit.shared.model, fit.values[: len(fit.shared.model.names)], name)
+    slope = np.zeros(len(fit.names))
+    square = max(abs(K) ** 2, 1e-300)
+    slope[fit.names.index(name)] = -K.imag / square
+    slope[fit.names.index(SINE_OF[name])] = K.real / square
+    return float(np.angle(K)), slope
+
+
+def _in_degrees(fit: Fit, angle: float, slope: FloatArray) -> str:
+    turned = float(np.degrees(np.remainder(angle + np.pi, 2 * np.pi) - np.pi))
+    return f"{turned:.3g}° ± {np.degrees(_half(fit, slope)):.2g}°"
+
+
+def _half(fit: Fit, slope: FloatArray) -> float:
+    """Half the 95 % interval of what has this slope (Q,)."""
+    return fit.quantile * float(np.sqrt(max(float(slope @ fit.covariance @ slope), 0.0)))

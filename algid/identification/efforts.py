@@ -31,43 +31,36 @@ Known = dict[str, tuple[float, float]]
 """Values and standard deviations by name."""
 
 
-def with_effort(fit: Fit, settings: Settings) -> Settings:
-    """The settings with the effort, or without gravity, that the logs show.
+def of_effort(fit: Fit, settings: Settings) -> tuple[Settings, list[Notice]]:
+    """The settings with the effort, or without gravity, that the logs of `fit` show.
 
-    The same where they show neither.
+    With it notices of what was not asked for.
     """
-    if fit.shared.model.gravity == 0:
-        return settings
-    if settings.effort is None and _arm_weightless(fit):
-        settings = settings.but(effort="gravity-compensated")
-    if settings.effort == "gravity-compensated" and _payload_weightless(fit):
-        settings = settings.but(gravity=0.0)
-    return settings
-
-
-def of_effort(fit: Fit, shown: Settings, asked: Settings) -> list[Notice]:
-    """Notices of the effort that the logs of `fit` show, in `shown`, where none was `asked` for."""
-    notices = []
-    if shown.gravity != asked.gravity:
-        notices.append(Notice("GRAVITY_COMPENSATED", numbers={"case": "payload"}))
-    if asked.effort is not None:
-        return notices
-    flag = Remedy({"effort": "gravity-compensated"}, "for such a driver")
-    if shown.effort is not None and fit.shared.payload and shown.gravity > 0:
-        notices.append(
-            Notice("GRAVITY_COMPENSATED", numbers={"case": "arm alone"}, remedies=(flag,))
+    shown, notices = settings, list[Notice]()
+    if fit.shared.model.gravity > 0:
+        if shown.effort is None and _arm_weightless(fit):
+            shown = shown.but(effort="gravity-compensated")
+        if shown.effort == "gravity-compensated" and _payload_weightless(fit):
+            shown = shown.but(gravity=0.0)
+            notices.append(Notice("GRAVITY_COMPENSATED", numbers={"case": "payload"}))
+    if settings.effort is not None:
+        return shown, notices
+    if shown.effort is not None:
+        case, remedies = (
+            "arm alone",
+            [Remedy({"effort": "gravity-compensated"}, "for such a driver")],
         )
-    elif shown.effort is not None:
-        level = Remedy({"gravity": 0}, "for a horizontal plane")
-        notices.append(
-            Notice("GRAVITY_COMPENSATED", numbers={"case": "arm"}, remedies=(flag, level))
-        )
+        if not fit.shared.payload or shown.gravity == 0:
+            case = "arm"
+            remedies.append(Remedy({"gravity": 0}, "for a horizontal plane"))
+        numbers = {"case": case}
+        notices.append(Notice("GRAVITY_COMPENSATED", numbers=numbers, remedies=tuple(remedies)))
     elif _external(fit):
         notices.append(Notice("EXTERNAL_EFFORT", remedies=(Remedy({"effort": "external"}),)))
     elif _without_friction(fit):
         compensated = Remedy({"effort": "friction-compensated"}, "for such a driver")
         notices.append(Notice("FRICTION_COMPENSATED", remedies=(compensated,)))
-    return notices
+    return shown, notices
 
 
 def _arm_weightless(fit: Fit) -> bool:

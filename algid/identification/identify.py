@@ -21,12 +21,10 @@ from algid.identification.open_logs import (
     LogLike,
     open_sources,
     read_otherwise,
-    with_twins_marked,
 )
-from algid.identification.outcome import Identified
+from algid.identification.outcome import Identified, result_of
 from algid.identification.recordings import Recording, Recordings
 from algid.identification.series import residual_of, write_fit_series
-from algid.identification.summary import result_of
 from algid.methods import estimator_of, settles
 from algid.options import flag
 from algid.physics.effort import absent
@@ -127,10 +125,7 @@ def identify(
     if earlier is not None:
         meaning = reused(profile, earlier.result)
     settings = _with_meaning(settings, meaning, earlier)
-    sources = with_twins_marked(
-        open_sources(unloaded, "unloaded", meaning, settings.gravity, settings.effort),
-        open_sources(loaded, "loaded", meaning, settings.gravity, settings.effort),
-    )
+    sources = open_sources(unloaded, loaded, meaning, settings.gravity, settings.effort)
     survey = Recordings(sources, progress)
     stated: dict[str, Any] = {}
     if meaning is not None:
@@ -266,21 +261,19 @@ def _by_likelihood(
 
     A zero of θ1 that is `stated` is not doubted.
     """
-    from algid.identification.checks import doubted
-    from algid.identification.efforts import of_effort, with_effort
+    from algid.identification.checks import doubted, turn_note
+    from algid.identification.efforts import of_effort
     from algid.identification.outcome import outcome_of
-    from algid.identification.phases import turn_note
     from algid.identification.prior import statement_of, with_prior
 
     said = statement_of(settings)
     first = _fitted(survey, settings, earlier)
-    found, shown = doubted(first), settings
+    found = doubted(first)
     of_driver: list[Notice] = []
     if found is first:  # of constants in doubt no weight is missed
-        shown = with_effort(found.fit, settings)
-        of_driver = of_effort(found.fit, shown, settings)
-    if shown != settings:
-        found = doubted(_fitted(survey, shown, earlier))
+        shown, of_driver = of_effort(found.fit, settings)
+        if shown != settings:
+            found = doubted(_fitted(survey, shown, earlier))
     if said is not None:
         found = replace(found, fit=with_prior(found.fit, said))
     survey.begin("prediction")
@@ -314,9 +307,8 @@ def _zero_is_stated(log: Recording, stated: dict[str, Any]) -> bool:
 
 def _fitted(survey: Recordings, settings: Settings, earlier: Earlier | None) -> Fitted:
     """The fit with the terms that the logs choose."""
-    from algid.identification.by_likelihood import run_fit
+    from algid.identification.by_likelihood import choose_model, run_fit
     from algid.identification.known import prior_of
-    from algid.identification.model_choice import choose_model
 
     survey.begin("choosing terms")
     if earlier is None:

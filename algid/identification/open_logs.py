@@ -94,9 +94,22 @@ def open_source(
 
 
 def _in_memory(log: Log, role: Role, gravity: float, effort: str | None) -> Recording:
-    """The source of a log from arrays."""
-    log = _in_radians(log)
+    """The source of a log from arrays.
+
+    Its angles are rad by the definition of `Log`, however far joints turn.
+    """
+    reading = log.origin.reading
+    if "theta1" not in reading.channels and "DEGREES" not in reading.accepted:
+        accepted = replace(reading, accepted=reading.accepted + ("DEGREES",))
+        log = replace(log, origin=replace(log.origin, reading=accepted))
     check_step(log.origin.path, log.stamp_ns)
+
+    def digest() -> str:
+        every = hashlib.sha256()
+        for array in (log.stamp_ns, log.theta, log.tau):
+            every.update(array.tobytes())
+        return every.hexdigest()
+
     return Recording(
         name=log.origin.path,
         role=role,
@@ -105,7 +118,7 @@ def _in_memory(log: Log, role: Role, gravity: float, effort: str | None) -> Reco
         promised=len(log),
         gravity=gravity,
         effort=effort,
-        digest=partial(_hash_of_arrays, log),
+        digest=digest,
     )
 
 
@@ -117,11 +130,15 @@ def _of_file(
 
     reader = open_log(path, profile)
 
+    def checked() -> Iterator[Log]:
+        for number, block in enumerate(reader.blocks()):
+            if number == 0:  # which has to be sampled as an arm is
+                check_step(block.origin.path, block.stamp_ns)
+            yield block
+
     def blocks() -> Iterator[Log]:
-        read = _of_an_arm(reader.blocks())
-        if 0 < reader.rows <= SHORT:
-            return read  # a thread would cost more than it reads ahead
-        return ahead(read)
+        # of a short log a thread would cost more than it reads ahead
+        return checked() if 0 < reader.rows <= SHORT else ahead(checked())
 
     return Recording(
         name=str(path),
@@ -135,84 +152,46 @@ def _of_file(
     )
 
 
-def _of_an_arm(blocks: Iterator[Log]) -> Iterator[Log]:
-    """The blocks of a log, once the first is known to be sampled as an arm is."""
-    for number, block in enumerate(blocks):
-        if number == 0:
-            check_step(block.origin.path, block.stamp_ns)
-        yield block
-
-
 def open_sources(
-    logs: LogLike | Iterable[LogLike] | None,
-    role: Role,
+    unloaded: LogLike | Iterable[LogLike] | None,
+    loaded: LogLike | Iterable[LogLike] | None,
     profile: Profile | None,
     gravity: float,
     effort: str | None = None,
 ) -> list[Recording]:
-    """Sources of one log, several, or none: see `open_source`.
+    """Sources of one log, several, or none of each role, unloaded ones first: see `open_source`.
 
     A log that is given twice, byte for byte, counts once, and the first of the two has a notice of
-    the other. Only logs that promise as many samples as another are hashed for it.
+    the other; a loaded one that is also given as unloaded has a notice of that: its payload is
+    zero. Only logs that promise as many samples as another are hashed for it.
     """
-    if logs is None:
-        return []
-    if isinstance(logs, str | Path | Log | Staged) or is_columns(logs):
-        logs = [logs]
-    if not isinstance(logs, Iterable):
-        refuse_others(logs)
-    sources = [open_source(log, role, profile, gravity, effort) for log in logs]
+    sources: list[Recording] = []
+    both: tuple[tuple[Role, LogLike | Iterable[LogLike] | None], ...]
+    both = (("unloaded", unloaded), ("loaded", loaded))
+    for role, logs in both:
+        if logs is None:
+            continue
+        if isinstance(logs, str | Path | Log | Staged) or is_columns(logs):
+            logs = [logs]
+        if not isinstance(logs, Iterable):
+            refuse_others(logs)
+        sources += [open_source(log, role, profile, gravity, effort) for log in logs]
     lengths = Counter(source.promised for source in sources if source.digest)
     kept: list[Recording] = []
-    places: dict[str, int] = {}
+    seen: dict[str, dict[Role, Recording]] = {}
     for source in sources:
         if source.digest is not None and lengths[source.promised] > 1:
-            place = places.setdefault(source.digest(), len(kept))
-            if place < len(kept):
-                twin = Notice("SAME_LOG", numbers={"case": "twice", "name": source.name})
-                kept[place].notices += (twin,)
+            twins = seen.setdefault(source.digest(), {})
+            if source.role in twins:
+                numbers = {"case": "twice", "name": source.name}
+                twins[source.role].notices += (Notice("SAME_LOG", numbers=numbers),)
                 continue
+            for twin in twins.values():
+                numbers = {"case": "loaded", "name": source.name, "twin": twin.name}
+                source.notices += (Notice("SAME_LOG", numbers=numbers),)
+            twins[source.role] = source
         kept.append(source)
     return kept
-
-
-def with_twins_marked(unloaded: list[Recording], loaded: list[Recording]) -> list[Recording]:
-    """All logs, unloaded ones first.
-
-    A loaded one that is also given as unloaded has a notice of it: its payload is zero.
-    """
-    if _hashed_lengths(unloaded).isdisjoint(_hashed_lengths(loaded)):
-        return unloaded + loaded
-    names = {}
-    for source in unloaded:
-        if source.digest:
-            names[source.digest()] = source.name
-    for source in loaded:
-        if source.digest is not None and source.digest() in names:
-            numbers = {"name": source.name, "twin": names[source.digest()]}
-            source.notices += (Notice("SAME_LOG", numbers={"case": "loaded"} | numbers),)
-    return unloaded + loaded
-
-
-def _hashed_lengths(sources: Iterable[Recording]) -> set[int]:
-    """How many samples those sources promise that can be hashed."""
-    return {source.promised for source in sources if source.digest}
-
-
-def _in_radians(log: Log) -> Log:
-    """A log from arrays: its angles are rad by the definition of `Log`, however far joints turn."""
-    reading = log.origin.reading
-    if "theta1" in reading.channels or "DEGREES" in reading.accepted:
-        return log
-    accepted = replace(reading, accepted=reading.accepted + ("DEGREES",))
-    return replace(log, origin=replace(log.origin, reading=accepted))
-
-
-def _hash_of_arrays(log: Log) -> str:
-    digest = hashlib.sha256()
-    for array in (log.stamp_ns, log.theta, log.tau):
-        digest.update(array.tobytes())
-    return digest.hexdigest()
 
 
 def read_otherwise(logs: Sequence[LogSummary], earlier: Result, file: str) -> list[Notice]:
@@ -222,11 +201,9 @@ def read_otherwise(logs: Sequence[LogSummary], earlier: Result, file: str) -> li
         return []
     notices = []
     for log in logs:
-        if log.reading is None:
-            continue
-        differences = sorted(log.reading.differences(before))
+        differences = sorted(log.reading.differences(before)) if log.reading else []
         if differences:
-            numbers = {"file": file, "differences": ", ".join(differences)}
+            numbers = {"case": "reading", "file": file, "differences": ", ".join(differences)}
             name = PurePath(log.path).name
-            notices.append(Notice("OTHER_ARM", numbers={"case": "reading"} | numbers, logs=(name,)))
+            notices.append(Notice("OTHER_ARM", numbers=numbers, logs=(name,)))
     return notices

@@ -5,28 +5,38 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Literal
+from pathlib import PurePath
+from typing import Any
 
 import numpy as np
 
-from algid import results
-from algid.arm import CONSTANT_NAMES, FloatArray
+from algid import __version__, results
+from algid.arm import CONSTANT_NAMES
 from algid.base.names import outside, places_outside, within
 from algid.base.significance import chance, level
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, repeatability, term_worths
 from algid.estimators.fit import Fit, alone
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
-from algid.estimators.prediction import PredictionScore, cross_validate, score
+from algid.estimators.prediction import PredictionScore, cross_validate
 from algid.estimators.terms import Selection
 from algid.identification.by_likelihood import Fitted
-from algid.identification.checks import fit_notes, remarks
-from algid.identification.series import torque_coefficients, torque_shift
-from algid.identification.validate import prediction
-from algid.model import DELAYS, UNITS, attributes
-from algid.notices import Notice
+from algid.identification.checks import FAR_APART, fit_notes, remarks
+from algid.identification.recordings import Recordings
+from algid.identification.series import predictor_of_fit
+from algid.identification.validate import prediction, scores
+from algid.model import DELAYS, K4, UNITS, attributes
+from algid.notices import Notice, has_code, merged
 from algid.physics.effort import absent
-from algid.results import Estimate, Status
-from algid.table4 import LOADED_ROWS, UNLOADED_ROWS, finite
+from algid.results import Estimate, Result, Status
+from algid.results.verdict import LEAST_R2
+from algid.settings import Settings
+from algid.table4 import (
+    LOADED_ROWS,
+    UNLOADED_ROWS,
+    finite,
+    table4,
+    true_parameters,
+)
 from algid.table4 import UNITS as TABLE_UNITS
 
 
@@ -56,32 +66,41 @@ class Identified:
 
 
 def outcome_of(found: Fitted) -> Identified:
-    """The fit as a result holds it."""
-    fit, survey, settings = found.fit, found.survey, found.settings
+    """The fit as a result holds it.
+
+    Its estimates come from one solution: where one of them breaks a bound of physics by more than
+    chance explains, or a joint's torque is predicted worse than its mean would, none can be
+    trusted. A torque that hardly varies leaves R² nothing to explain, nor does a joint that is
+    hardly driven; there the residual has to be a tenth of what acts on the joint at least.
+    """
+    fit, settings = found.fit, found.settings
+    gone = set(fit.absent) | set(absent(settings.effort, CONSTANT_NAMES))
     # a constant that the model has no column for is not identifiable
     estimates = {name: unknown(UNITS[name]) for name in CONSTANT_NAMES}
-    estimates |= _estimates(fit.names, fit.values, fit.std, fit.quantile, fit.status)
-    estimates = with_significance(estimates)
-    gone = set(fit.absent) | set(absent(settings.effort, CONSTANT_NAMES))
-    parameters, payload = {}, {}
-    for name, one in estimates.items():
-        if name in gone:
-            continue
-        if name in PAYLOAD_PARAMETERS:
-            payload[name] = one
-        else:
-            parameters[name] = one
+    estimates |= _estimates(fit, fit.status)
+    parameters, payload, loaded = (dict[str, Estimate]() for _ in range(3))
+    for name in outside(estimates, gone):
+        group = payload if name in PAYLOAD_PARAMETERS else parameters
+        group[name] = estimates[name]
     rows, stds = table_rows(fit)
-    combined = {}
-    if survey.loaded:
-        combined = _loaded_rows(fit, rows, stds, gone)
+    status_of = dict(zip(fit.names, fit.status, strict=True))
+    for name, constants in LOADED_ROWS.items() if fit.shared.payload else ():
+        if not gone.isdisjoint(constants):
+            continue
+        loaded[name] = unknown(TABLE_UNITS[name])
+        if name in rows:
+            status = "OK" if fit.converged else "NOT_CONVERGED"
+            if fit.converged and "FROM_PRIOR" in map(status_of.get, constants):
+                status = "FROM_PRIOR"
+            half, unit = fit.quantile * stds[name], TABLE_UNITS[name]
+            loaded[name] = estimate(rows[name], stds[name], half, unit, status)
     summary = fit_summary(found)
     notices = list(remarks(found))
     if settings.cross_validate and summary.cross_validation is None:
         notices.append(Notice("SHORT_LOG", numbers={"case": "validation"}))
     outcome = Identified(
         parameters=parameters,
-        loaded=combined,
+        loaded=loaded,
         payload=payload,
         rows=rows,
         estimator=fit.estimator,
@@ -89,52 +108,14 @@ def outcome_of(found: Fitted) -> Identified:
         fit=summary,
         notices=notices + list(fit_notes(summary)),
     )
-    accepted = {code for log in survey.logs for code in log.origin.reading.accepted}
-    torque = "FROM_PRIOR" not in fit.status  # a prior errs by as much as it says
-    if is_implausible(summary, bounds="BROKEN_BOUND" not in accepted, torque=torque):
+    judged = summary.cross_validation or summary.residual
+    if "FROM_PRIOR" in fit.status:  # a prior errs by as much as it says
+        judged = None
+    far = any((one.distance_sigma or 0.0) > FAR_BEYOND for one in summary.broken_bounds)
+    far &= "BROKEN_BOUND" not in found.survey.accepted
+    if far or (judged is not None and judged.unexplained(least=0.0)):
         return outcome.distrusted()
     return outcome
-
-
-def _loaded_rows(
-    fit: Fit, rows: Mapping[str, float], stds: Mapping[str, float], gone: set[str]
-) -> dict[str, Estimate]:
-    """Estimates of the loaded arm's rows of Table 4, save those with a constant that is `gone`."""
-    combined = {}
-    status_of = dict(zip(fit.names, fit.status, strict=True))
-    for name, constants in LOADED_ROWS.items():
-        unit = TABLE_UNITS[name]
-        status = "OK"
-        if not fit.converged:
-            status = "NOT_CONVERGED"
-        elif any(status_of.get(one) == "FROM_PRIOR" for one in constants):
-            status = "FROM_PRIOR"
-        if not gone.isdisjoint(constants):
-            continue
-        if name in rows:
-            half = fit.quantile * stds[name]
-            combined[name] = estimate(rows[name], stds[name], half, unit, status)
-        else:
-            combined[name] = unknown(unit)
-    return with_significance(combined)
-
-
-def is_implausible(
-    summary: results.FitSummary, *, bounds: bool = True, torque: bool = True
-) -> bool:
-    """Whether physics or the torque contradict a fit.
-
-    Its estimates come from one solution: where one of them breaks a bound by more than chance
-    explains, or a joint's torque is predicted worse than its mean would, none can be trusted. A
-    torque that hardly varies leaves R² nothing to explain, nor does a joint that is hardly driven;
-    there the residual has to be a tenth of what acts on the joint at least. Without `bounds`, or
-    `torque`, by the other alone.
-    """
-    for bound in summary.broken_bounds:
-        if bounds and bound.distance_sigma is not None and bound.distance_sigma > FAR_BEYOND:
-            return True
-    judged = summary.cross_validation or summary.residual
-    return torque and judged is not None and bool(judged.unexplained(least=0.0))
 
 
 def distrusted(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
@@ -146,50 +127,27 @@ def distrusted(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
     return changed
 
 
-def _estimates(
-    names: Sequence[str],
-    values: FloatArray,
-    stds: FloatArray,
-    quantile: float,
-    statuses: Sequence[str] = (),
-) -> dict[str, Estimate]:
-    """Estimates by name.
-
-    Without `statuses`, those whose deviation is infinite are not identifiable.
-    """
-    if not statuses:
-        statuses = np.where(np.isfinite(stds), "OK", "NOT_IDENTIFIABLE").tolist()
+def _estimates(fit: Fit, statuses: Sequence[str]) -> dict[str, Estimate]:
+    """Estimates of a fit by name, of those `statuses`."""
     estimates = {}
-    for name, value, std, status in zip(names, values, stds, statuses, strict=True):
-        estimates[name] = estimate(value, std, quantile * std, UNITS[name], status)
+    for name, value, std, status in zip(fit.names, fit.values, fit.std, statuses, strict=True):
+        estimates[name] = estimate(value, std, fit.quantile * std, UNITS[name], status)
     return estimates
 
 
 def estimate(value: float, std: float, half: float, unit: str, status: str) -> Estimate:
-    """One estimate with `half` its interval.
+    """One estimate with `half` its interval: one that contains zero is not significant.
 
     Nothing but its unit where the logs do not determine it.
     """
     if status == "NOT_IDENTIFIABLE":
         return unknown(unit)
-    interval = (finite(value - half), finite(value + half))
+    low, high = finite(value - half), finite(value + half)
+    if status == "OK" and low is not None and high is not None and low <= 0 <= high:
+        status = "NOT_SIGNIFICANT"
     return Estimate(
-        estimate=finite(value), std=finite(std), ci95=interval, unit=unit, status=Status(status)
+        estimate=finite(value), std=finite(std), ci95=(low, high), unit=unit, status=Status(status)
     )
-
-
-def with_significance(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
-    """The estimates; those whose 95 % interval contains zero are not significant."""
-    changed = dict(group)
-    for name, one in group.items():
-        if one.status is Status.OK and _holds_zero(one):
-            changed[name] = one.model_copy(update={"status": Status.NOT_SIGNIFICANT})
-    return changed
-
-
-def _holds_zero(one: Estimate) -> bool:
-    low, high = one.ci95 or (None, None)
-    return low is not None and high is not None and low <= 0 <= high
 
 
 def unknown(unit: str) -> Estimate:
@@ -232,14 +190,36 @@ def fit_summary(found: Fitted) -> results.FitSummary:
     """The statistical part of a result."""
     fit, chosen = found.fit, found.chosen
     residual, crossed = _predicted(found)
-    cross_validation = None
-    if crossed is not None:
-        cross_validation = prediction(crossed)
-    names, covariance = _covariance(fit)
+    noise = {}  # root mean squares over the logs
+    if fit.noise:
+        levels = np.square([np.append(one.theta, one.tau) for one in fit.noise])
+        squares = np.sqrt(np.mean(levels, axis=0)).tolist()
+        noise = dict(zip(("theta1", "theta2", "tau1", "tau2"), squares, strict=True))
+    there, lost = places_outside(fit.names, fit.absent), np.isinf(fit.std)
+    covariance = np.where(lost | lost[:, None], np.inf, fit.covariance)[np.ix_(there, there)]
+    by_log, coloured = [], fit.intervals != "likelihood"
+    for log in fit.logs:
+        own = alone(fit.shared, [log], fit.shrinkage, coloured=coloured)
+        own = replace(own, quantile=fit.quantile)
+        statuses = np.where(np.isfinite(own.std), "OK", "NOT_IDENTIFIABLE").tolist()
+        by_log.append(_estimates(own, statuses))
+    repeated = None
+    if (scatter := repeatability(fit)) is not None:
+        masses, std, ci95 = scatter
+        repeated = results.Repeatability(masses=masses.tolist(), std=std, ci95=ci95)
+    expected: tuple[str, ...] = ()  # each is what the logs and a prior agree on
+    if fit.shrinkage is not None:
+        expected = fit.shrinkage.names
+    elif chosen.undetermined is not None:
+        expected = within(DELAYS, fit.names)
+    gain, known = None, found.settings.payload_mass
+    if known is not None and "m_p" in fit.names:
+        # all that has N m in its unit, m_p too, grows with a common gain of both torques
+        gain = _inverse(fit, "m_p", known, "1")
     return results.FitSummary(
-        noise=_noise(fit),
-        covariance_names=names,
-        covariance=covariance,
+        noise=noise,
+        covariance_names=list(outside(fit.names, fit.absent)),
+        covariance=[[finite(value) for value in row] for row in covariance],
         intervals=fit.intervals,
         iterations=fit.iterations,
         converged=fit.converged,
@@ -250,45 +230,22 @@ def fit_summary(found: Fitted) -> results.FitSummary:
             coulomb_speed=chosen.model.coulomb_speed,
             stribeck_speed=chosen.model.stribeck_speed,
             chosen_by=chosen.chosen_by,
-            shrunk=_expected(fit, chosen),
+            shrunk=list(expected),
         ),
         terms=list(_terms(fit, chosen)),
         torque_hold=_torque_hold(chosen),
         broken_bounds=_bounds(fit),
         endogeneity=_endogeneity(fit),
-        by_log=list(_by_log(fit)),
+        by_log=by_log,
         residual=prediction(residual),
-        cross_validation=cross_validation,
-        repeatability=_repeatability(fit),
-        torque_gain=_torque_gain(fit, found.settings.payload_mass),
-        stiffness=_stiffness(fit),
+        cross_validation=None if crossed is None else prediction(crossed),
+        repeatability=repeated,
+        torque_gain=gain,
+        stiffness={
+            f"k_e{joint + 1}": _inverse(fit, name, 1.0, "N m/rad")
+            for name, joint in attributes(fit.shared.model, "elastic")
+        },
     )
-
-
-def _by_log(fit: Fit) -> Iterator[dict[str, Estimate]]:
-    """Each log's own estimates."""
-    coloured = fit.intervals != "likelihood"
-    for log in fit.logs:
-        own = alone(fit.shared, [log], fit.shrinkage, coloured=coloured)
-        yield _estimates(own.names, own.values, own.std, fit.quantile)
-
-
-def _noise(fit: Fit) -> dict[str, float]:
-    """Standard deviations of angles and torques, root mean squares over the logs."""
-    if not fit.noise:
-        return {}
-    levels = [np.append(one.theta, one.tau) for one in fit.noise]
-    level = np.sqrt(np.mean(np.square(levels), axis=0))
-    return dict(zip(("theta1", "theta2", "tau1", "tau2"), level.tolist(), strict=True))
-
-
-def _covariance(fit: Fit) -> tuple[list[str], list[list[float | None]]]:
-    """Names of the parameters that the torque holds, and their covariance."""
-    there = places_outside(fit.names, fit.absent)
-    lost = np.isinf(fit.std)
-    covariance = np.where(lost | lost[:, None], np.inf, fit.covariance)[np.ix_(there, there)]
-    known = [[finite(value) for value in row] for row in covariance]
-    return list(outside(fit.names, fit.absent)), known
 
 
 def _whiteness(fit: Fit) -> dict[str, results.WhitenessTest]:
@@ -333,22 +290,10 @@ def _endogeneity(fit: Fit) -> dict[str, results.Endogeneity]:
     return {"largest": test}
 
 
-def _repeatability(fit: Fit) -> results.Repeatability | None:
-    """Scatter of the payload's mass over the loaded logs; None of fewer than it takes."""
-    repeated = repeatability(fit)
-    if repeated is None:
-        return None
-    masses, std, ci95 = repeated
-    return results.Repeatability(masses=masses.tolist(), std=std, ci95=ci95)
-
-
 def _predicted(found: Fitted) -> tuple[PredictionScore, PredictionScore | None]:
     """How well the fit predicts its own logs and, if asked and possible, each from the others."""
     fit, survey, settings = found.fit, found.survey, found.settings
-    own = PredictionScore()
-    for log in survey.logs:
-        c = torque_coefficients(fit, log.role)
-        own += score(fit.shared.model, c, survey.segments(log), torque_shift(settings, fit))
+    own = sum(scores(predictor_of_fit(found), survey), PredictionScore())
     if not settings.cross_validate:
         return own, None
     unloaded = [partial(survey.segments, log) for log in survey.unloaded]
@@ -356,34 +301,15 @@ def _predicted(found: Fitted) -> tuple[PredictionScore, PredictionScore | None]:
     return own, cross_validate(fit, unloaded, loaded, settings.torque_shift())
 
 
-def _expected(fit: Fit, chosen: Selection) -> list[str]:
-    """Coefficients of terms that were not chosen: each is what the logs and a prior agree on."""
-    if fit.shrinkage is not None:
-        return list(fit.shrinkage.names)
-    if chosen.undetermined is None:
-        return []
-    return list(within(DELAYS, fit.names))
-
-
 def _torque_hold(chosen: Selection) -> results.TorqueHold:
     """What was asked of the torque's hold, what was used, and what the logs show."""
-    asked: Literal["auto", "foh", "zoh"] = "auto"
-    if chosen.hold_by == "settings":
-        asked = chosen.hold
-    late = chosen.late
-    if late is None or chosen.hold_by != "logs":
-        return results.TorqueHold(asked=asked, used=chosen.hold)
-    return results.TorqueHold(
-        asked=asked,
-        used=chosen.hold,
-        told=late.determined,
-        faster=late.faster,
-        half=late.half,
-        late=late.late,
-        late_std=finite(late.std),
-        odds=finite(late.odds),
-        share=finite(late.share),
-    )
+    late, shown = chosen.late, dict[str, Any]()
+    if late is not None and chosen.hold_by == "logs":
+        shown = {"told": late.determined, "faster": late.faster, "half": late.half}
+        shown |= {"late": late.late, "late_std": finite(late.std)}
+        shown |= {"odds": finite(late.odds), "share": finite(late.share)}
+    asked = chosen.hold if chosen.hold_by == "settings" else "auto"
+    return results.TorqueHold(asked=asked, used=chosen.hold, **shown)
 
 
 def _terms(fit: Fit, chosen: Selection) -> Iterator[results.TermCriterion]:
@@ -401,22 +327,6 @@ def _terms(fit: Fit, chosen: Selection) -> Iterator[results.TermCriterion]:
         )
 
 
-def _torque_gain(fit: Fit, known: float | None) -> Estimate | None:
-    """What the logs' torques have to be multiplied by, where the payload's mass is known, in kg.
-
-    All that has N m in its unit, m_p too, grows with a common gain of both torques; lengths do not.
-    """
-    if known is None or "m_p" not in fit.names:
-        return None
-    return _inverse(fit, "m_p", known, "1")
-
-
-def _stiffness(fit: Fit) -> dict[str, Estimate]:
-    """Stiffness of each elastic joint, by the inverse of its compliance."""
-    joints = attributes(fit.shared.model, "elastic")
-    return {f"k_e{joint + 1}": _inverse(fit, name, 1.0, "N m/rad") for name, joint in joints}
-
-
 def _inverse(fit: Fit, name: str, over: float, unit: str) -> Estimate:
     """`over` a parameter, with its interval; unknown where that may be nothing or less."""
     place = fit.names.index(name)
@@ -426,3 +336,91 @@ def _inverse(fit: Fit, name: str, over: float, unit: str) -> Estimate:
         return unknown(unit)
     found = estimate(over / value, over / value * std / value, 0.0, unit, fit.status[place])
     return found.model_copy(update={"ci95": (over / (value + half), over / (value - half))})
+
+
+CONTRADICTED = ("WRONG_CONVENTION", "LOST_SAMPLES")
+"""Checks by which estimates are wrong, unless the user accepts them.
+
+A time base that is too short by the samples it lacks falsifies accelerations by twice their share.
+"""
+_OF_GRAVITY = ("FLIPPED_SIGN", "WRONG_ZERO")
+"""Checks of single logs, on which the estimator's own has the last word."""
+
+
+def _pulled_down(fit: results.FitSummary | None, count: int) -> list[bool]:
+    """True for each of `count` logs if gravity pulls down in its part of the fit, beyond doubt.
+
+    The fit has to explain the torques and to break no bound. A zero that is off turns k4 into its
+    sine part k4s: the model must have had that to choose from.
+    """
+    if fit is None or fit.model is None or fit.residual is None or len(fit.by_log) != count:
+        return [False] * count
+    if fit.model.chosen_by != "logs" or fit.broken_bounds or fit.residual.unexplained(LEAST_R2):
+        return [False] * count
+    down = []
+    for own in fit.by_log:
+        along, across = own.get(K4), own.get(f"{K4}s")
+        turned = across.estimate or 0.0 if across is not None else 0.0
+        pull, std = (along.estimate, along.std) if along is not None else (None, None)
+        down.append(bool(pull and std and pull > max(FAR_APART * std, abs(turned))))
+    return down
+
+
+def result_of(outcome: Identified, settings: Settings, survey: Recordings) -> Result:
+    """The result of `outcome` on a survey's logs, the first log first."""
+    truth = survey.logs[0].origin.truth
+    payload = None
+    if survey.loaded and survey.loaded[0].origin.truth:
+        payload = survey.loaded[0].origin.truth.payload
+    fit, turned = outcome.fit, has_code(outcome.notices, "WRONG_ZERO")
+    # no likelihood stands within the bounds of physics and upright
+    doubtful = fit is None or outcome.estimator != "refined" or bool(fit.broken_bounds) or turned
+    # checks, as code and case, of single logs that the fit of all of them makes more precisely
+    replaced = []
+    if turned:
+        replaced.append("WRONG_ZERO:")
+    if settings.effort is not None:
+        replaced.append("GRAVITY_COMPENSATED:arm")
+    if not doubtful:  # in another unit no angle's sine would fit
+        replaced.append("DEGREES:reach")
+    down = _pulled_down(fit, len(survey.logs))
+    of_logs: list[Notice] = []
+    lost, wrong = False, {"WRONG_ZERO"} if turned else set()
+    for log, is_down in zip(survey.logs, down, strict=True):
+        for notice in survey.notices(log, doubtful=doubtful):
+            if notice.key in replaced or (is_down and notice.code in _OF_GRAVITY):
+                continue
+            of_logs.append(notice.of(PurePath(log.name).name))  # the paths stand among the logs
+            lost |= notice.lossy
+            other = notice.code == "OTHER_JOINTS" and bool(notice.numbers.get("swing", False))
+            if other or notice.code in CONTRADICTED:
+                wrong.add(notice.code)
+    if has_code(of_logs, "WRONG_CONVENTION"):  # of which gravity that is turned is a part
+        kept = [one for one in outcome.notices if one.code != "WRONG_ZERO"]
+        outcome = replace(outcome, notices=kept)
+        wrong.discard("WRONG_ZERO")
+    if wrong - survey.accepted:
+        outcome = outcome.distrusted()
+    other_arms = []  # synthetic logs that another arm than the first log's made
+    for log in survey.logs:
+        own = log.origin.truth
+        if truth and own and own.arm != truth.arm:
+            numbers = {"case": "metadata", "first": survey.logs[0].name}
+            other_arms.append(Notice("OTHER_ARM", numbers=numbers, logs=(log.name,)))
+    summaries = [survey.summary(log) for log in survey.logs]
+    return Result(
+        version=__version__,
+        estimator=outcome.estimator or settings.estimator,
+        parameters=outcome.parameters,
+        loaded=outcome.loaded,
+        payload=outcome.payload,
+        paper_payload=outcome.paper_payload,
+        table4=table4(outcome.rows, outcome.stds, truth, payload),
+        truth=true_parameters(truth, payload),
+        fit=outcome.fit,
+        settings=settings.as_json(),
+        log=summaries[0],
+        more_logs=summaries[1:],
+        data_lost=lost,
+        notices=[*merged(of_logs), *other_arms, *outcome.notices],
+    )

@@ -134,6 +134,11 @@ class Recordings:
         """The logs of the arm with its payload."""
         return [log for log in self.logs if log.role == "loaded"]
 
+    @property
+    def accepted(self) -> set[str]:
+        """Codes of what the user says is right in some log."""
+        return {code for log in self.logs for code in log.origin.reading.accepted}
+
     def begin(self, stage: str, logs: Sequence[Recording] | None = None) -> None:
         """The passes from here on are over `logs`, by default all, and of that stage."""
         self._stage, self._words = stage, ""

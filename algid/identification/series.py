@@ -6,7 +6,8 @@ Time series of a result folder, written block by block.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,12 +27,11 @@ from algid.estimators.innovations import (
 from algid.estimators.noise import first_guess
 from algid.estimators.prediction import CUTOFF, MOTION, scored_torque
 from algid.estimators.running import has_running, running
-from algid.identification.recordings import Recordings
+from algid.identification.recordings import Recordings, Role
 from algid.model import Model, Motion, inertia, torque
-from algid.settings import Settings
 from algid.signals.filters import half_length, smoothed
 from algid.signals.segments import Segment, pieces
-from algid.signals.shift import TorqueShift
+from algid.signals.shift import AT_ONCE, TorqueShift
 
 if TYPE_CHECKING:
     from algid.identification.by_likelihood import Fitted
@@ -41,24 +41,27 @@ NOISE_SHARE = 0.05  # of the torque's RMS: what the angles' noise may add to the
 LOWEST, HIGHEST = 4.0, 40.0  # Hz
 
 
-def torque_blocks(
-    survey: Recordings,
-    model: Model,
-    coefficients: Mapping[str, FloatArray],
-    shift: TorqueShift,
-) -> Iterator[dict[str, FloatArray]]:
-    """Motion, measured and predicted torque of every log; by role its coefficients.
+@dataclass(frozen=True)
+class Predictor:
+    """A model to be judged on logs: torque, coefficients by role, and the logged torque's shift."""
 
-    `shift` says after how long a logged torque acts.
+    model: Model
+    coefficients: Callable[[Role], FloatArray]
+    shift: TorqueShift = AT_ONCE
+
+
+def torque_blocks(survey: Recordings, known: Predictor) -> Iterator[dict[str, FloatArray]]:
+    """Motion, measured and predicted torque of every log.
 
     Angles are smoothed without phase; the prediction is NaN where the smoother reaches past a
     stretch's end.
     """
     for number, log in enumerate(survey.logs):
+        c = known.coefficients(log.role)
         for piece in pieces(survey.segments(log), PREDICTED_ROWS):
             yield {
                 "log": np.full(len(piece), number, dtype=np.int32),
-                **_torques(piece, model, coefficients[log.role], shift.at(piece.dt)),
+                **_torques(piece, known.model, c, known.shift.at(piece.dt)),
             }
 
 
@@ -103,16 +106,11 @@ SCORED_RATE = 10.0
 """Samples a period of the highest frequency that is scored."""
 
 
-def scored_blocks(
-    survey: Recordings,
-    model: Model,
-    coefficients: Mapping[str, FloatArray],
-    shift: TorqueShift,
-) -> Iterator[dict[str, FloatArray]]:
-    """The torque that is scored and its prediction, of every log; arguments as `torque_blocks`."""
+def scored_blocks(survey: Recordings, known: Predictor) -> Iterator[dict[str, FloatArray]]:
+    """The torque that is scored and its prediction, of every log."""
     for number, log in enumerate(survey.logs):
-        c = coefficients[log.role]
-        for piece in scored_torque(model, c, survey.segments(log), shift):
+        c = known.coefficients(log.role)
+        for piece in scored_torque(known.model, c, survey.segments(log), known.shift):
             step = 1
             if piece.t.size > 1:
                 dt = float(piece.t[1] - piece.t[0])
@@ -227,9 +225,9 @@ def residual_of(found: Fitted) -> ResidualSums | None:
     problem = problem_of(found.survey, found.settings, found.chosen)
     if fit.delay is not None:
         problem = problem.at(found.chosen.model, fit.delay)
-    sums = []
+    sums, known = [], predictor_of_fit(found)
     for loaded, sources in problem.kinds():
-        c = torque_coefficients(fit, "loaded" if loaded else "unloaded")
+        c = known.coefficients("loaded" if loaded else "unloaded")
         for source in sources:
             of_log = weak.residuals(source, problem.settings, c)
             if of_log is not None:
@@ -250,15 +248,9 @@ def write_fit_series(folder: Path, found: Fitted, residual: ResidualSums | None)
         summary = survey.summary(log)
         starts.append(summary.start_ns)
         durations.append(summary.duration)
-    coefficients: dict[str, FloatArray] = {}
-    for log in survey.logs:
-        coefficients[log.role] = torque_coefficients(fit, log.role)
-    model, shift = fit.shared.model, torque_shift(found.settings, fit)
-    torques = torque_blocks(survey, model, coefficients, shift)
-    write_columns(folder / "torque.parquet", torques, starts)
-    write_columns(
-        folder / "scored.parquet", scored_blocks(survey, model, coefficients, shift), starts
-    )
+    known = predictor_of_fit(found)
+    write_columns(folder / "torque.parquet", torque_blocks(survey, known), starts)
+    write_columns(folder / "scored.parquet", scored_blocks(survey, known), starts)
     # a log too short for a window is in no fit, and which it is nobody knows
     every = len(fit.logs) == len(durations)
     if every:
@@ -270,11 +262,12 @@ def write_fit_series(folder: Path, found: Fitted, residual: ResidualSums | None)
         write_columns(folder / "innovations.parquet", rows, starts)
 
 
-def torque_coefficients(fit: Fit, role: str) -> FloatArray:
-    """Coefficients of the model's columns for a log of that role."""
-    return fit.shared.coefficients(fit.values, role == "loaded")[: len(fit.shared.model.names)]
+def predictor_of_fit(found: Fitted) -> Predictor:
+    """The model of a fit, with the delay that it estimates, if any."""
+    fit = found.fit
+    model = fit.shared.model
 
+    def coefficients(role: Role) -> FloatArray:
+        return fit.shared.coefficients(fit.values, role == "loaded")[: len(model.names)]
 
-def torque_shift(settings: Settings, fit: Fit) -> TorqueShift:
-    """After how long a logged torque acts, with the delay of the fit, if any."""
-    return settings.torque_shift(fit.delay)
+    return Predictor(model, coefficients, found.settings.torque_shift(fit.delay))

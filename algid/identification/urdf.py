@@ -18,7 +18,7 @@ from algid.base.errors import ResultError
 from algid.base.files import read_text
 from algid.base.words import counted
 from algid.identification.recordings import Role
-from algid.identification.validate import Predictor
+from algid.identification.series import Predictor
 from algid.model import SINES, TERMS, Model
 
 GRAVITY = 9.81

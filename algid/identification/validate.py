@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from algid.arm import FloatArray
 from algid.base.text import ABSENT, file_name, visible
 from algid.estimators.prediction import CUTOFF, FILTER, PredictionScore, score
 from algid.estimators.rollout import HORIZONS, RolloutScore, rollouts
 from algid.identification.known import model_of, reused, shift_of, torque_constants
 from algid.identification.open_logs import LogLike, open_source
 from algid.identification.recordings import Recordings, Role
-from algid.identification.series import torque_blocks
-from algid.model import Model
+from algid.identification.series import Predictor, torque_blocks
 from algid.results import Result, TorquePrediction
-from algid.signals.shift import AT_ONCE, TorqueShift
 from algid.table4 import finite
 
 if TYPE_CHECKING:
@@ -50,15 +47,6 @@ def prediction(score: PredictionScore) -> TorquePrediction | None:
         rmse_rest=rest,
         rmse_held=held,
     )
-
-
-@dataclass(frozen=True)
-class Predictor:
-    """A model to be judged on logs: torque, coefficients by role, and the logged torque's shift."""
-
-    model: Model
-    coefficients: Callable[[Role], FloatArray]
-    shift: TorqueShift = AT_ONCE
 
 
 def predictor_of(result: Result, name: str) -> Predictor:
@@ -171,6 +159,13 @@ class Validated:
             yield Table("Angles of the arm simulated forward", headings, rows)
 
 
+def scores(known: Predictor, survey: Recordings) -> Iterator[PredictionScore]:
+    """How well the torque of each of a survey's logs is predicted; raises as `coefficients`."""
+    for log in survey.logs:
+        c = known.coefficients(log.role)
+        yield score(known.model, c, survey.segments(log), known.shift)
+
+
 def validate(known: Predictor, survey: Recordings, *, simulate: bool = False) -> Validated:
     """Predict the torque of a survey's logs and, if asked, simulate the arm from their states.
 
@@ -182,13 +177,12 @@ def validate(known: Predictor, survey: Recordings, *, simulate: bool = False) ->
     predictions: dict[str, TorquePrediction | None] = {}
     simulation: dict[str, RolloutScore] = {}
     total, rolled = PredictionScore(), RolloutScore()
-    for log in survey.logs:
-        c = known.coefficients(log.role)
-        one = score(known.model, c, survey.segments(log), known.shift)
+    for log, one in zip(survey.logs, scores(known, survey), strict=True):
         predictions[log.name] = prediction(one)
         total += one
         if simulate:
             duration, moving = survey.whole(log).duration, survey.segments(log)
+            c = known.coefficients(log.role)
             angles = rollouts(known.model, c, moving, duration, known.shift)
             simulation[log.name] = angles
             rolled += angles
@@ -203,8 +197,7 @@ def predicted(result: Result, log: LogLike, role: Role, profile: Profile | None)
 
     known = predictor_of(result, result.log.path)
     source = open_source(log, role, reused(profile, result), known.model.gravity)
-    coefficients: dict[str, FloatArray] = {role: known.coefficients(role)}
-    blocks = list(torque_blocks(Recordings([source]), known.model, coefficients, known.shift))
+    blocks = list(torque_blocks(Recordings([source]), known))
     if not blocks:
         return pl.DataFrame()
     return pl.concat(map(pl.DataFrame, blocks), rechunk=True).drop("log")

@@ -23,6 +23,7 @@ from algid.identification.open_logs import open_source
 from algid.identification.recordings import Recordings
 from algid.identification.series import (
     START_KEY,
+    Predictor,
     information_blocks,
     scored_blocks,
     torque_blocks,
@@ -31,7 +32,6 @@ from algid.identification.series import (
 )
 from algid.log import Log, Origin
 from algid.model import Model
-from algid.signals.shift import AT_ONCE
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 from tests.identification.fits import CASE, K, fit_of
@@ -90,7 +90,9 @@ def test_the_predicted_torque_is_that_of_the_equation_of_motion(
     over an end.
     """
     survey = Recordings([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
-    blocks = list(torque_blocks(survey, Model(), {"unloaded": K, "loaded": LOADED_K}, AT_ONCE))
+    blocks = list(
+        torque_blocks(survey, Predictor(Model(), {"unloaded": K, "loaded": LOADED_K}.__getitem__))
+    )
     for number, (log, omega) in enumerate(both):
         own = [block for block in blocks if block["log"][0] == number]
         column = {name: np.concatenate([block[name] for block in own]) for name in own[0]}
@@ -183,7 +185,7 @@ def test_the_torque_in_the_file_is_the_one_that_is_scored(
     """
     survey = Recordings([open_source(both[0][0], "unloaded")])
     wrong = K * np.array([1, 1, 1.1, 0.9, 1, 1, 1.05])
-    (block,) = scored_blocks(survey, Model(), {"unloaded": wrong}, AT_ONCE)
+    (block,) = scored_blocks(survey, Predictor(Model(), lambda _: wrong))
     found = score(Model(), wrong, survey.segments(survey.logs[0]))
     for joint in (1, 2):
         residual = block[f"tau{joint}"] - block[f"tau{joint}_predicted"]

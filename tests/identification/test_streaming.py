@@ -11,13 +11,11 @@ import pytest
 import algid
 from algid.arm import FloatArray
 from algid.identification import recordings as surveys
-from algid.identification.by_likelihood import run_fit
+from algid.identification.by_likelihood import choose_model, run_fit
 from algid.identification.by_paper import run_paper
-from algid.identification.model_choice import choose_model
 from algid.identification.open_logs import open_source
-from algid.identification.outcome import outcome_of
+from algid.identification.outcome import outcome_of, result_of
 from algid.identification.recordings import Recording, Recordings
-from algid.identification.summary import result_of
 from algid.log import Log
 from algid.results import Result
 from algid.settings import Settings

@@ -15,7 +15,8 @@ from algid.base.errors import ResultError
 from algid.identification.identify import identify
 from algid.identification.open_logs import open_source
 from algid.identification.recordings import Recordings, Role
-from algid.identification.validate import Predictor, predictor_of, validate
+from algid.identification.series import Predictor
+from algid.identification.validate import predictor_of, validate
 from algid.log import Log, Origin
 from algid.model import Model
 from algid.results import Result

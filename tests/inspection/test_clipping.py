@@ -24,7 +24,7 @@ def cut_off() -> Log:
 
 
 def surveyed(log: Log) -> Recordings:
-    return Recordings(open_sources(log, "unloaded", None, 9.81))
+    return Recordings(open_sources(log, None, None, 9.81))
 
 
 def told(survey: Recordings) -> list[str]:
