@@ -20,8 +20,7 @@ from importlib import resources
 from itertools import groupby
 from typing import Any
 
-from algid.base.text import joined
-from algid.base.words import counted
+from algid.base.text import counted, joined
 from algid.options import FLAGS, SET, VALUES, flag
 
 

@@ -27,9 +27,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "significance": room(),
     "criteria": room(),
     "ros2": room("errors", "numpy"),
-    "words": room(),
     "text": room(),
-    "notices": room("options text words"),
+    "notices": room("options text"),
     "verdict": room("notices"),
     "arm": room(packages="numpy", library=PURE),
     "blocks": room(packages="numpy"),
@@ -56,42 +55,42 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "moved": room("errors options"),
     "results": room(
         "errors files log model names notices options settings significance text "
-        "verdict words", "numpy polars pydantic"),
+        "verdict", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm estimators limits log model names results synth"),
     "writers": room("arrow errors files log ros2", "mcap numpy polars pyarrow"),
     "readers": room(
         "arm arrow blocks criteria errors faults files limits log notices options profile "
-        "quantiles ros2 runtime text units words",
+        "quantiles ros2 runtime text units",
         "google h5py lz4 mcap numpy polars pyarrow rosbags ruamel scipy zstandard",
     ),
     "inspection": room("arm criteria errors estimators faults files log model notices profile "
                        "quantiles readers signals text units", "numpy pydantic_core"),
     "report": room(
         "arm arrow blocks criteria errors files inspection methods model notices options "
-        "progress quantiles results ros2 significance text verdict words",
+        "progress quantiles results ros2 significance text verdict",
         "jinja2 markupsafe mcap numpy plotly pyarrow pydantic_core rich"
     ),
     "check": room("errors files options results", "pydantic"),
     "identification": room(
         "arm arrow check criteria errors estimators files inspection log methods model names "
         "notices options physics profile progress readers report results runtime settings signals "
-        "significance table4 text units words",
+        "significance table4 text units",
         "numpy polars pyarrow",
     ),
     "batches": room(
         "errors files guard identification limits options profile readers results "
-        "runtime settings staging stores text words",
+        "runtime settings staging stores text",
         "distributed polars pyarrow pydantic",
     ),
     "tracks": room(
         "arm compiled criteria errors estimators files identification model names notices options "
-        "profile report results runtime signals significance text verdict words",
+        "profile report results runtime signals significance text verdict",
         "numpy polars pyarrow pydantic",
     ),
     "designs": room(
         "arm criteria errors estimators files identification limits log model names "
-        "notices options progress report results signals significance synth text verdict words "
+        "notices options progress report results signals significance synth text verdict "
         "writers",
         "numpy polars pydantic pydantic_core scipy",
     ),
@@ -101,7 +100,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "jinja2 numpy polars scipy",
     ),
     "fleet": room("arm errors files limits model notices progress report "
-                  "significance text verdict words", "numpy polars scipy"),
+                  "significance text verdict", "numpy polars scipy"),
     "api": room(
         "arm batches check designs errors exits exports files fleet identification "
         "inspection limits log methods moved notices options physics profile progress "
@@ -123,7 +122,7 @@ def sources() -> dict[str, str]:
         parts = ("algid", *path.relative_to(ROOT).with_suffix("").parts)
         name = ".".join(parts).removesuffix(".__init__").replace("algid.base.", "algid.")
         text = path.read_text(encoding="utf-8")
-        found[name] = text.replace("algid.base.", "algid.").replace("algid.base ", "algid ")
+        found[name] = text.replace("algid.base.", "algid.").replace("algid.base", "algid ")
     del found["algid.base"]
     return found
 

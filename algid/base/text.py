@@ -1,4 +1,4 @@
-"""How names and numbers are written: the one place, so that every format shows the same.
+"""How names, numbers and counts are written: the one place, so that every format shows the same.
 
 Names out of logs are foreign text, which may not reach a terminal or a page as it is.
 """
@@ -10,7 +10,8 @@ import math
 import re
 import textwrap
 import unicodedata
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 
 LONGEST = 300
 # Controls drive a terminal, format characters reorder what is read, separators break lines.
@@ -46,6 +47,29 @@ def joined(words: Sequence[str], most: int | None = None) -> str:
     if most is not None and len(words) > most:
         words[most:] = [f"{len(words) - most} more"]
     return " and ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
+
+
+def counted(count: int, one: str, many: str = "") -> str:
+    """A number and its noun, with what follows where that changes with it: 1 log, 2 logs.
+
+    1 row lacks, 2 rows lack.
+
+    Parameters
+    ----------
+    count : int
+    one : str
+        The words for one of them.
+    many : str
+        The words for none or several; without them, those for one with an s.
+    """
+    if count == 1:
+        return f"{count:,} {one}"
+    return f"{count:,} {many or one + 's'}"
+
+
+def repeated(names: Iterable[str]) -> list[str]:
+    """The names that stand there more than once, in the order of their first places."""
+    return [name for name, count in Counter(names).items() if count > 1]
 
 
 def unit_text(unit: str) -> str:

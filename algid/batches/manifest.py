@@ -29,8 +29,7 @@ from pydantic import (
 from algid.base.errors import SettingError
 from algid.base.files import first_misfit, read_start, read_text, toml_content
 from algid.base.limits import LIMITS
-from algid.base.text import visible
-from algid.base.words import repeated
+from algid.base.text import repeated, visible
 from algid.batches.jobs import Job, Label, Time, name_fault
 
 

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from algid import __version__
-from algid.base.text import ABSENT, file_name, percent, resolved, significant, unit_text
+from algid.base.text import ABSENT, counted, file_name, percent, resolved, significant, unit_text
 from algid.base.verdict import Verdict, graded
-from algid.base.words import counted
 from algid.designs.campaign import ARMS, SECOND, Design
 from algid.designs.limits import Row
 from algid.model import UNITS

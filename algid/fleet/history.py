@@ -11,7 +11,7 @@ import polars as pl
 from algid.base.errors import ResultError
 from algid.base.limits import LIMITS
 from algid.base.progress import Progress
-from algid.base.words import counted
+from algid.base.text import counted
 from algid.fleet.findings import FEWEST, SPAN, followed
 from algid.model import FIRST_TERMS, Model
 from algid.notices import Notice

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from algid import __version__
 from algid.base.files import whole_file
 from algid.base.significance import NORMAL
-from algid.base.text import ABSENT, joined, percent, significant, unit_text, visible
+from algid.base.text import ABSENT, counted, joined, percent, significant, unit_text, visible
 from algid.base.verdict import Verdict, graded
-from algid.base.words import counted
 from algid.fleet.findings import ALPHA, CHANGED, SPAN
 from algid.fleet.history import History
 from algid.model import UNITS

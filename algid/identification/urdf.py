@@ -16,7 +16,7 @@ import numpy as np
 from algid.arm import Arm, FloatArray
 from algid.base.errors import ResultError
 from algid.base.files import read_text
-from algid.base.words import counted
+from algid.base.text import counted
 from algid.identification.recordings import Role
 from algid.identification.series import Predictor
 from algid.model import SINES, TERMS, Model

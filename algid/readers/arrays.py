@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from algid.base.arrow import column_of
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
-from algid.base.words import counted, repeated
+from algid.base.text import counted, repeated
 from algid.notices import Notice
 from algid.readers.column_names import TIMES
 from algid.readers.flat import as_log_error

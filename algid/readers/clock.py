@@ -19,7 +19,7 @@ from algid.base.criteria import BRIDGED
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.quantiles import median
-from algid.base.words import counted
+from algid.base.text import counted
 from algid.log import IntArray
 from algid.notices import Notice, Remedy
 from algid.readers.table import SampleTable, stack

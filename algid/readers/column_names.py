@@ -14,8 +14,8 @@ from itertools import chain
 from typing import NamedTuple
 
 from algid.base.limits import LIMITS
+from algid.base.text import counted
 from algid.base.units import CURRENT, is_foreign, unit_of
-from algid.base.words import counted
 from algid.readers.joints import along_the_arm
 
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
+from algid.base.text import counted
 from algid.base.units import is_foreign, unit_of
-from algid.base.words import counted
 from algid.options import flag
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from algid.arm import FloatArray
 from algid.base.errors import LogError
 from algid.base.faults import during
 from algid.base.limits import LIMITS
-from algid.base.words import counted
+from algid.base.text import counted
 from algid.log import IntArray, Log, Origin
 from algid.notices import Notice, Remedy
 from algid.readers.clock import in_order

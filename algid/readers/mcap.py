@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.runtime import ahead
-from algid.base.words import counted
+from algid.base.text import counted
 from algid.log import KEY, IntArray, loads
 from algid.notices import Notice
 from algid.readers.messages.message_file import (

@@ -19,7 +19,7 @@ import numpy as np
 from algid.base.arrow import column_of, numbers_of, whole_column
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
-from algid.base.words import repeated
+from algid.base.text import repeated
 from algid.log import Companion
 from algid.notices import Notice
 from algid.readers.column_names import STEMS

@@ -15,9 +15,8 @@ from algid import __version__
 from algid.arm import FloatArray
 from algid.base.files import whole_file
 from algid.base.significance import NORMAL, sigmas
-from algid.base.text import ABSENT, file_name, joined, percent, visible
+from algid.base.text import ABSENT, counted, file_name, joined, percent, visible
 from algid.base.verdict import Grade, Verdict
-from algid.base.words import counted
 from algid.report.document import Document, Section, Table
 from algid.report.plot import down
 from algid.report.render import page

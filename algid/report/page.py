@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from algid.base.progress import Progress
-from algid.base.text import file_name, joined, significant
-from algid.base.words import counted
+from algid.base.text import counted, file_name, joined, significant
 from algid.methods import settles
 from algid.report.document import Content, Document, Section
 from algid.report.figures import arm_of, figures, intervals, over_time

@@ -10,9 +10,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Literal
 
 from algid.arm import CONSTANT_NAMES as ARM
-from algid.base.text import ABSENT, formatted, joined, lines_of, visible
+from algid.base.text import ABSENT, counted, formatted, joined, lines_of, visible
 from algid.base.verdict import MOST_REASONS, Grade, Verdict
-from algid.base.words import counted
 from algid.model import DELAYS
 from algid.notices import codes_of
 from algid.report.document import Document, Kind, Table

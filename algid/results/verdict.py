@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 from algid.base.names import outside
 from algid.base.significance import SURE
-from algid.base.text import percent, significant, visible
+from algid.base.text import counted, percent, significant, visible
 from algid.base.verdict import Verdict, graded
-from algid.base.words import counted
 from algid.model import CHOICES, EVERY_TERM, K1, K2, K3, K4, K5, K6, K7
 from algid.notices import Notice, Remedy, flat, has_code, notes_of, of_codes, warnings_of
 from algid.options import flag

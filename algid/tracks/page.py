@@ -13,9 +13,8 @@ import numpy as np
 
 from algid.base.criteria import HOLE
 from algid.base.significance import NORMAL
-from algid.base.text import file_name, formatted, joined, resolved, significant
+from algid.base.text import counted, file_name, formatted, joined, resolved, significant
 from algid.base.verdict import Verdict, graded
-from algid.base.words import counted
 from algid.notices import Notice, has_code, lossy, notes_of, warnings_of
 from algid.report.document import Document, Section, Table
 from algid.report.export import write_mcap

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
-from algid.base.words import repeated
+from algid.base.text import repeated
 from algid.notices import Remedy
 from algid.profile import Profile
 from algid.readers.column_names import STEMS, ChannelChoice, choose

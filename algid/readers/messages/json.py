@@ -11,7 +11,7 @@ from itertools import count
 from typing import Any
 
 from algid.base.limits import LIMITS
-from algid.base.words import repeated
+from algid.base.text import repeated
 from algid.readers.messages.layout import MessageLayout, MisfitError, Numbers
 from algid.readers.messages.message_file import Messages
 from algid.readers.stated import BAD, GOOD, GROUPS

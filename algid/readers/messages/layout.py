@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from algid.base.blocks import concatenated, rows_of
 from algid.base.limits import LIMITS
-from algid.base.words import counted
+from algid.base.text import counted
 from algid.readers.messages.message_file import Messages, gather
 from algid.readers.stated import BAD, GOOD, GROUPS
 

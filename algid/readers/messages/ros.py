@@ -15,7 +15,7 @@ from functools import lru_cache
 from typing import Any
 
 from algid.base.limits import LIMITS
-from algid.base.words import counted
+from algid.base.text import counted
 from algid.readers.messages.layout import MessageLayout, MisfitError, Numbers
 from algid.readers.stated import GROUPS
 
