@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from algid import __version__
 from algid.base.text import ABSENT, counted, file_name, percent, resolved, significant, unit_text
 from algid.base.verdict import Verdict, graded
 from algid.designs.campaign import ARMS, SECOND, Design
@@ -36,7 +35,6 @@ def design_document(design: Design, source: str, doubts: Sequence[Notice] = ()) 
     campaign, name = design.campaign, file_name(source)
     information = shares_of_time(design.names, design.shares, SECOND)
     return Document(
-        title=f"Design for {name}",
         verdict=verdict(design, doubts),
         sections=(
             Section("numbers", "Numbers", (bound_table(design), limit_table(design))),
@@ -47,7 +45,6 @@ def design_document(design: Design, source: str, doubts: Sequence[Notice] = ()) 
         name=name,
         facts=f"{significant(campaign.duration, 4)} s under position control · logged at "
         f"{significant(campaign.experiment.rate, 4)} Hz · prior {name}",
-        made=f"Made by algid {__version__}.",
         arm=_arm(design),
     )
 

@@ -11,7 +11,6 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from algid import __version__
 from algid.base.files import whole_file
 from algid.base.significance import NORMAL
 from algid.base.text import ABSENT, counted, joined, percent, significant, unit_text, visible
@@ -48,7 +47,6 @@ def write_history(history: History, out: Path, batch: Path) -> tuple[Document, l
     figure, links = overview(history), links_of(history, batch, out)
     folded = history.roster.height > MOST_ROBOTS
     document = Document(
-        title="Fleet",
         verdict=verdict(history),
         sections=(
             Section("numbers", "Findings", (finding_table(history, links),)),
@@ -57,7 +55,6 @@ def write_history(history: History, out: Path, batch: Path) -> tuple[Document, l
         ),
         kicker="a fleet's history",
         name="Fleet",
-        made=f"Made by algid {__version__}.",
     )
     with whole_file(out / "fleet.html") as temporary:
         temporary.write_text(page(document), encoding="utf-8")

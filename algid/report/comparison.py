@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from pydantic_core import to_json
 
-from algid import __version__
 from algid.arm import FloatArray
 from algid.base.files import whole_file
 from algid.base.significance import NORMAL, sigmas
@@ -163,7 +162,6 @@ def write_comparison(found: Comparison, path: Path, force: bool) -> None:
             figure.add(0, found.sigma[place + 1, known], names, label, f"result {place % 5}")
         figure.mark(0, "chance", -NORMAL, NORMAL)
     document = Document(
-        title="Comparison",
         verdict=verdict(found),
         sections=(
             Section("numbers", "Differences", (figure, estimates)),
@@ -172,7 +170,6 @@ def write_comparison(found: Comparison, path: Path, force: bool) -> None:
         kicker="results side by side",
         name=joined(labels, 3),
         facts=f"{counted(len(labels), 'result')} · measured against {labels[0]}",
-        made=f"Made by algid {__version__}.",
     )
     with whole_file(path, force=force) as temporary:
         temporary.write_text(page(document), encoding="utf-8")

@@ -87,21 +87,17 @@ class Document:
 
     Parameters
     ----------
-    title : what it is, in one line
     verdict : how far to trust what it is about
     sections : in the order in which they are read
-    kicker, name, facts : a page's head: kind of page, its subject, and identifying numbers
-    made : what made it, the page's last line
+    kicker, name, facts : its head: what it is, its subject, and identifying numbers
     arm : the arm, drawn beside the first section
     """
 
-    title: str
     verdict: Verdict
     sections: Sequence[Section]
-    kicker: str = ""
-    name: str = ""
+    kicker: str
+    name: str
     facts: str = ""
-    made: str = ""
     arm: ArmDrawing | None = None
 
     @property
@@ -116,5 +112,5 @@ class Document:
 
     def tables(self, folded: bool = False) -> list[Table]:
         """The tables of the sections that are folded, or of those that are not."""
-        every = [one for part in self.parts if part.folded == folded for one in part.shown]
-        return [one for one in every if isinstance(one, Table)]
+        of = [part for part in self.sections if part.folded == folded]
+        return [one for part in of for one in part.shown if isinstance(one, Table)]

@@ -119,7 +119,7 @@ def residual(folder: Path) -> Panels | None:
     for place, (joint, kind) in enumerate(each):
         of_joint = rows_of(rows, rows["joint"] == joint)
         own = rows_of(of_joint, of_joint["quantity"] == kind)
-        x, y, low, high = own["x"], own["value"], own["low"], own["high"]
+        x, y, low, high = stacked(own, ("x", "value", "low", "high"))
         panels.band(place, x, low, high, "95 % band of white noise")
         if kind == "autocorrelation":
             stems = np.stack([0 * y, y, np.nan * y], axis=1).ravel()

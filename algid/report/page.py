@@ -95,7 +95,6 @@ def result_document(
     sections.insert(1 if leads else len(sections), of_paper)
     constants = [row[4] for row in arm[0].rows]
     return Document(
-        title=f"Identification of {names[0]}",
         verdict=result.verdict,
         sections=sections,
         kicker="identification of a two-link arm",
@@ -108,6 +107,5 @@ def result_document(
             significant(result.log.rate, 4),
             counted(sum(log.rows for log in result.logs), "sample"),
         ),
-        made=f"Made by algid {result.version} from result.json.",
         arm=arm_of(result, raw),
     )

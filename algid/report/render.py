@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic_core import to_json
 
+from algid import __version__
 from algid.base.files import whole_file
 from algid.base.text import visible
 from algid.base.verdict import MOST_REASONS
@@ -57,6 +58,7 @@ def page(document: Document, shared_library: bool = False) -> str:
             drawn=packed_text(gzip.compress(to_json(drawn, inf_nan_mode="null"), mtime=0)),
             library="" if shared_library else packed_text(library()),
             beside=LIBRARY,
+            version=__version__,
             nonce=place,
         )
     )

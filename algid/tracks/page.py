@@ -45,7 +45,6 @@ def track_document(result: TrackResult) -> Document:
     made = [("algid", result.version), ("arm's result", result.arm)]
     made.append(("sha256 of the arm's result", result.arm_sha256))
     return Document(
-        title=f"Payload in time of {name}",
         verdict=verdict(result),
         sections=(
             Section("numbers", "Numbers", (stretch_table(result), change_table(result))),
@@ -62,7 +61,6 @@ def track_document(result: TrackResult) -> Document:
         name=name,
         facts=f"arm of {file_name(result.arm)} · {seconds} s of log at {rate} Hz · "
         f"{counted(result.log.rows, 'sample')}",
-        made=f"Made by algid {result.version}.",
     )
 
 

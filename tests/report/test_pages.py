@@ -9,6 +9,7 @@ import html
 import json
 import re
 import shutil
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -166,7 +167,7 @@ def test_no_status_of_a_failed_result_is_good(folder: Path, result: Result) -> N
     assert "whole ok" not in failed.text
 
 
-def document(**more: object) -> Document:
+def document() -> Document:
     reasons = tuple(Notice("A", f"reason {place}", logs=("a.csv",)) for place in range(5))
     verdict = Verdict("reservations", "k1 is known", reasons, (Notice("B", "a note", note=True),))
     table = Table("T & Co", "A | N", (("x|y", "1"),), "a note")
@@ -175,17 +176,15 @@ def document(**more: object) -> Document:
         Section("none", "None", (Table("empty", "A", ()), ())),
         Section("two", "Two", ("a sentence", ("first", "second"), table), folded=True),
     )
-    return Document("Title", verdict, parts, "kicker", "name", "facts", "made", **more)  # type: ignore[arg-type]
+    return Document(verdict, parts, "kicker", "name", "facts")
 
 
 def test_markdown_has_every_table_and_a_command_that_can_be_copied() -> None:
     command = "algid identify 'a `b` ```c```.csv' --force"
-    one = document()
-    text = markdown(
-        Document(one.title, Verdict("failed", "it failed", command=command), one.sections)
-    )
+    failed = Verdict("failed", "it failed", command=command)
+    text = markdown(replace(document(), verdict=failed))
     lines = text.splitlines()
-    assert lines[0] == "### Title"
+    assert lines[0] == "### Kicker: name"
     assert "❌ **Failed**: it failed." in text
     at = lines.index("    " + command)
     assert lines[at - 1] == lines[at + 1] == ""
