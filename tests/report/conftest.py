@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from algid.report.series import Drawn, drawn
 from algid.results import Result, read_result
 from tests.report.folders import build
 
@@ -19,3 +20,10 @@ def case_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def result(case_folder: Path) -> Result:
     return read_result(case_folder)
+
+
+@pytest.fixture(scope="session")
+def raw(case_folder: Path) -> Drawn:
+    found = drawn(case_folder / "torque.parquet")
+    assert found is not None
+    return found

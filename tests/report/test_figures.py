@@ -13,29 +13,26 @@ import pytest
 from algid.api.report import report
 from algid.base.errors import ResultError
 from algid.base.significance import NORMAL
+from algid.base.text import significant
 from algid.report.figures import (
     closeup,
     correlation,
+    coverage,
     figures,
     inertia,
     intervals,
     over_time,
     residual,
     shares_of_time,
+    signals,
     torque,
 )
-from algid.report.plot import Panels, label, packed
-from algid.report.series import Drawn, drawn
+from algid.report.plot import Panels, packed
+from algid.report.series import Drawn
 from algid.results import Result
+from algid.results.rows import known_truth
 from tests.report.folders import estimate
 from tests.report.pages import named, typed
-
-
-@pytest.fixture(scope="module")
-def raw(case_folder: Path) -> Drawn:
-    found = drawn(case_folder / "torque.parquet")
-    assert found is not None
-    return found
 
 
 def traces(plot: Panels | None, name: str) -> list[dict[str, Any]]:
@@ -79,6 +76,9 @@ def test_torque_stands_above_its_residual_and_the_worst_moment_has_every_sample(
         assert (y.min(), y.max()) == pytest.approx(ends, rel=1e-6)
     axes = [[trace["yaxis"] for trace in traces(plot, name)] for name in ("measured", "residual")]
     assert axes == [["y", "y3"], ["y2", "y4"]]
+    assert result.fit is not None
+    assert result.fit.prediction is not None
+    assert plot.title.endswith(f" below {result.fit.prediction.bandwidth:g} Hz")
     starts = sorted({shape["x0"] for shape in plot.layout["shapes"]})
     span = scored.filter(log=0)["t"]
     assert starts == pytest.approx([span[0], 1.01 * span[-1]])
@@ -88,8 +88,20 @@ def test_torque_stands_above_its_residual_and_the_worst_moment_has_every_sample(
         moment = float(rows["t"][int(left.arg_max() or 0)])
         assert np.nanmax(np.abs(y)) == pytest.approx(left.max(), rel=1e-6)
         assert np.median(np.diff(t)) == pytest.approx(1e-3, rel=1e-2)
+        assert f"N m at {moment:.3f} s of case1" in near.layout["annotations"][joint - 1]["text"]
         ends = max(-0.5, -moment), min(0.5, 4.0 - moment)
         assert (t[0], t[-1]) == pytest.approx(ends, abs=2e-3)
+
+
+def test_signals_and_the_motion_are_drawn_as_recorded(result: Result, raw: Drawn) -> None:
+    every = [(typed(one["y"]), one["yaxis"]) for one in signals(result, raw).data]
+    names = ("theta1", "theta2", "omega1", "omega2", "tau1", "tau2")
+    for (y, axis), name, own in zip(every, names, ("y", "y", "y2", "y2", "y3", "y3"), strict=True):
+        assert axis == own
+        np.testing.assert_array_equal(y, raw[name].astype(np.float32))
+    first, second = coverage(raw).data
+    assert typed(first["y"]) == pytest.approx(np.degrees(raw.samples["theta2"]), rel=1e-6)
+    assert typed(second["x"]) == pytest.approx(raw.samples["omega1"], rel=1e-6)
 
 
 def test_residuals_stand_against_the_band_of_white_noise(case_folder: Path) -> None:
@@ -115,8 +127,10 @@ def test_the_running_estimate_ends_at_its_last_value(case_folder: Path, result: 
     for place, one in enumerate(traces(plot, "estimate from all samples so far")):
         name = names[place]
         assert finite(typed(one["y"]))[-1] == pytest.approx(rows[name][-1], rel=1e-6)
-        axis = "yaxis" if place == 0 else f"yaxis{place + 1}"
-        low, high = plot.layout[axis]["range"]
+        axis = f"y{place + 1}" if place else "y"
+        low, high = plot.layout[axis.replace("y", "yaxis")]["range"]
+        marks = {shape["y0"] for shape in plot.layout["shapes"] if shape["yref"] == axis}
+        assert {result.estimates[name].estimate, known_truth(result).get(name)} - {None} <= marks
         assert low < rows[name][-1] - rows[f"{name}_half"][-1] < rows[name][-1] < high
 
 
@@ -148,6 +162,13 @@ def test_the_mass_matrix_has_the_spread_of_draws(result: Result, raw: Drawn) -> 
     place = int(np.argmin(abs(degrees - 60)))
     factors = np.array([2 * np.cos(np.radians(degrees[place])), 1, 1])
     assert m11[place] == pytest.approx(float(factors @ k), rel=1e-6)
+    k1, k3, k5 = k
+    straight = [[k5 + k3 + 2 * k1, k3 + k1], [k3 + k1, k3]]  # where M is the closest to singular
+    smallest = float(np.linalg.eigvalsh(straight)[0])
+    assert f"M is {significant(smallest, 3)} kg" in plot.note
+    (reached,) = plot.layout["shapes"]
+    turned = np.degrees(raw["theta2"])
+    assert (reached["x0"], reached["x1"]) == (np.nanmin(turned), np.nanmax(turned))
     half = typed(bands[0]["y"])[place] - m11[place]
     assert half == pytest.approx(NORMAL * (draws @ factors).std(), rel=0.03)
 
@@ -184,9 +205,3 @@ def test_numbers_travel_in_single_precision_unless_they_are_beyond_it() -> None:
     assert [packed(of)["dtype"] for of in (x, 1e42 * x, np.arange(3))] == ["f4", "f8", "f8"]
     np.testing.assert_array_equal(typed(packed(1e42 * x)), 1e42 * x)
     assert typed(packed(np.ones((2, 3)))).shape == (2, 3)
-
-
-def test_names_are_no_markup_for_plotly() -> None:
-    assert label("<b>x</b>&") == "&lt;b&gt;x&lt;/b&gt;&amp;"
-    assert label("a\x1b\u202e") == "a\\u001b\\u202e"
-    assert label("x" * 100) == "x" * 55 + "…"

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from algid.report.figures import arm_of
 from algid.report.plot import ArmDrawing
-from algid.report.series import Drawn, drawn
+from algid.report.series import Drawn
 from algid.results import Estimate, Result
-
-
-@pytest.fixture(scope="module")
-def raw(case_folder: Path) -> Drawn:
-    found = drawn(case_folder / "torque.parquet")
-    assert found is not None
-    return found
 
 
 def arm(result: Result, raw: Drawn) -> ArmDrawing:

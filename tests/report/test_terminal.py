@@ -21,25 +21,11 @@ def printed(table: Table, width: int) -> str:
     return text
 
 
-HEADS = (
-    "Parameter",
-    "Estimate",
-    "± 95 %",
-    "Unit",
-    "Status",
-    "±, %",
-    "Truth",
-    "Error, %",
-    "Meaning",
-)
-ROWS = (
-    ("k5+k3+z1+z2", "0.123456", "0.000123", "kg m²", "OK", "0.0123", "0.12340", "+0.04", "–"),
-    (
-        "k6", "12.34567", "0.01234", "N m s/rad", "NOT_IDENTIFIABLE", "0.0999", "12.3456", "+0.05",
-        "viscous friction of joint 1",
-    ),
-)  # fmt: skip
-ESTIMATES = Table("Parameters", " | ".join(HEADS), ROWS)
+HEADS = "Parameter | Estimate | ± 95 % | Unit | Status | ±, % | Truth | Error, % | Meaning"
+ROWS = """\
+k5+k3+z1+z2 | 0.123456 | 0.000123 | kg m² | OK | 0.0123 | 0.12340 | +0.04 | –
+k6 | 12.34567 | 0.01234 | N m s/rad | NOT_IDENTIFIABLE | 0.0999 | 12.3456 | +0.05 | viscous"""
+ESTIMATES = Table("Parameters", HEADS, [tuple(row.split(" | ")) for row in ROWS.splitlines()])
 
 
 def test_the_interval_and_the_status_stay_at_eighty_columns() -> None:
