@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 from scipy.stats import binom
 
-from algid.arm import FloatArray
+from algid.arm import CONSTANT_NAMES, FloatArray
+from algid.results import Result
 
 # half width of a normal interval of 90 % over one of 95 %
 AS_90 = 1.6448536269514722 / 1.959963984540054
@@ -46,3 +49,20 @@ def in_axes(error: FloatArray, covariance: FloatArray, quantile: float) -> Float
     independent.
     """
     return np.linalg.solve(np.linalg.cholesky(covariance), error) / quantile
+
+
+def distances(
+    result: Result, true: Iterable[float], names: Sequence[str] = CONSTANT_NAMES
+) -> FloatArray:
+    """Errors (n,) of a result's estimates in their standard deviations."""
+    found = [result.estimates[name] for name in names]
+    values, stds = np.array([(one.estimate, one.std) for one in found], dtype=np.float64).T
+    return np.asarray((values - list(true)) / stds)
+
+
+def holding(result: Result, true: Iterable[float]) -> int:
+    """How many intervals of k1 … k7 hold the truth."""
+    ends = [result.parameters[name].ci95 or (None, None) for name in CONSTANT_NAMES]
+    low, high = np.array(ends, dtype=np.float64).T
+    k = np.array(list(true))
+    return int(np.sum((low <= k) & (k <= high)))

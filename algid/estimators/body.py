@@ -15,7 +15,7 @@ import numpy as np
 from algid.base.names import outside, vector, within
 from algid.base.significance import sigmas
 from algid.estimators.combine import likelihood
-from algid.estimators.fit import Fit, finish
+from algid.estimators.fit import Fit, solved_anew
 from algid.estimators.parametrisation import BODY_PARAMETERS
 from algid.model import SINES
 from algid.physics.parameters import BODY
@@ -135,18 +135,7 @@ def with_body_of(fit: Fit, body: Sequence[str]) -> Fit:
     shared = replace(fit.shared, body=tuple(body))
     known = dict(zip(fit.names, fit.values.tolist(), strict=True))
     start = vector(shared.names, known, otherwise=0.0)
-    changed = finish(
-        fit.estimator,
-        shared,
-        fit.logs,
-        start,
-        fit.moved,
-        fit.prior,
-        coloured=fit.intervals != "likelihood",
-        samples=fit.freedom,
-        repeats=fit.repeats,
-        shrinkage=fit.shrinkage,
-    )
+    changed = solved_anew(fit, shared, start, fit.prior, fit.shrinkage)
     status = list(changed.status)
     for name, before in zip(fit.names, fit.status, strict=True):
         if before != "OK" and name in changed.names:

@@ -315,6 +315,24 @@ def finish(
     )
 
 
+def solved_anew(
+    fit: Fit, shared: Shared, start: FloatArray, prior: Prior | None, shrinkage: Prior | None
+) -> Fit:
+    """The fit of the same likelihoods, from `start` on, by other parameters or another prior."""
+    return finish(
+        fit.estimator,
+        shared,
+        fit.logs,
+        start,
+        fit.moved,
+        prior,
+        coloured=fit.intervals != "likelihood",
+        samples=fit.freedom,
+        repeats=fit.repeats,
+        shrinkage=shrinkage,
+    )
+
+
 def alone(
     shared: Shared,
     logs: Sequence[LogInformation],

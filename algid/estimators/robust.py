@@ -71,7 +71,7 @@ from algid.estimators.combine import (
 )
 from algid.estimators.diagnostics import broken_bounds
 from algid.estimators.excitation import undriven
-from algid.estimators.fit import Fit, finish
+from algid.estimators.fit import Fit, finish, solved_anew
 from algid.estimators.modulating_functions import Known, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
@@ -600,17 +600,8 @@ def unshrunk(fit: Fit, name: str) -> Fit:
     prior, shrinkage = fit.prior, fit.shrinkage
     if prior is None or shrinkage is None or name not in shrinkage.names:
         return fit
-    return finish(
-        fit.estimator,
-        fit.shared,
-        fit.logs,
-        fit.values,
-        fit.moved,
-        prior.silent_on((name,)),
-        coloured=True,
-        repeats=fit.repeats,
-        shrinkage=shrinkage.silent_on((name,)),
-    )
+    silent = prior.silent_on((name,)), shrinkage.silent_on((name,))
+    return solved_anew(fit, fit.shared, fit.values, *silent)
 
 
 def of_passive_joint(problem: Problem) -> Fit | None:

@@ -3,21 +3,13 @@
 A fit's logs are quadratic likelihoods by stretch of time; those up to a moment add up as all of
 them do.
 
-======  =====================================================  =============
-symbol  name                                                   shape
-======  =====================================================  =============
-beta    shared parameters by each moment                       (T, Q)
-half    half width of their 95 % intervals                     (T, Q)
-======  =====================================================  =============
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.estimators.combine import LogInformation, combine
@@ -29,20 +21,7 @@ MOMENTS = 48
 """About how many moments the logs are looked at together."""
 
 
-@dataclass(frozen=True, eq=False)
-class Running:
-    """Estimates by moment: the log (T,), the share of it (T,) processed, then the module's table.
-
-    NaN where the data so far do not determine a parameter.
-    """
-
-    log: NDArray[np.int32]
-    share: FloatArray
-    beta: FloatArray
-    half: FloatArray
-
-
-def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> Running:
+def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> dict[str, FloatArray]:
     """Estimates of a fit's parameters as its logs are gone over one after the other.
 
     Parameters
@@ -54,7 +33,9 @@ def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> Run
 
     Returns
     -------
-    Running
+    dict of arrays (T,)
+        `log`, the time `t` in s of it, each parameter, and, as ``NAME_half``, half its interval:
+        NaN where the data so far do not determine it.
 
     Notes
     -----
@@ -65,7 +46,7 @@ def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> Run
     _, plain = _estimate(fit, fit.logs)
     known = np.isfinite(fit.std) & (plain > 0)
     widening = np.divide(fit.std, plain, out=np.ones_like(plain), where=known)
-    places, shares, betas, halves = [], [], [], []
+    places, times, rows = [], [], []
     for number, log in enumerate(fit.logs):
         count = max(2, round(moments * durations[number] / sum(durations)))
         ends = np.unique(np.linspace(0, log.S.shape[0], count + 1).astype(int)[1:])
@@ -77,12 +58,11 @@ def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> Run
             so_far = [*fit.logs[:number], LogInformation(log.loaded, log.c0, S[None], g[None])]
             beta, std = _estimate(fit, so_far)
             places.append(number)
-            shares.append(end / log.S.shape[0])
-            betas.append(beta)
-            halves.append(fit.quantile * widening * std)
-    return Running(
-        np.array(places, dtype=np.int32), np.array(shares), np.array(betas), np.array(halves)
-    )
+            times.append(durations[number] * end / log.S.shape[0])
+            rows.append(np.concatenate([beta, fit.quantile * widening * std]))
+    names = (*fit.names, *(f"{name}_half" for name in fit.names))
+    columns = {"log": np.array(places, dtype=np.int32), "t": np.array(times)}
+    return columns | dict(zip(names, np.transpose(rows), strict=True))
 
 
 def _estimate(fit: Fit, logs: Sequence[LogInformation]) -> tuple[FloatArray, FloatArray]:

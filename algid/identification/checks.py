@@ -331,27 +331,27 @@ LEAST_TURN = np.radians(20.0)
 LEAST_CERTAIN = 5.0  # standard deviations of k1 and of k2 that an angle between them needs
 
 
-def turn_note(fit: Fit, log: Recording) -> Notice | None:
+def turn_note(fit: Fit, log: Recording) -> Iterator[Notice]:
     """That gravity is turned against θ1 as `log` was read, with the zero that turns it back.
 
-    Where its named zeros lie within the interval of ε1, the nearest is named. None where gravity is
-    turned by less than `LEAST_TURN`, and where it may be upside down, which signs make too.
+    Where its named zeros lie within the interval of ε1, the nearest is named. Nothing where gravity
+    is turned by less than `LEAST_TURN`, and where it may be upside down, which signs make too.
     """
     from algid.inspection.conventions import zeroed
 
     names = set(fit.names) - set(fit.absent)
     if not {K1, K2, SINE_OF[K1], SINE_OF[K2]} <= names or fit.shared.model.gravity == 0:
-        return None
+        return
     if min(_certainty(fit, K1), _certainty(fit, K2)) < LEAST_CERTAIN:
-        return None
+        return
     (second, of_second), (whole, of_whole) = _argument(fit, K1), _argument(fit, K2)
     turn = float(np.remainder(whole - second + np.pi, 2 * np.pi) - np.pi)
     half = _half(fit, of_whole - of_second)
     if not abs(turn) - half > LEAST_TURN or abs(turn) + half >= np.pi:
-        return None
+        return
     anyway = Remedy({"accept": "WRONG_ZERO"}, "where the arm is mounted so")
     numbers = {"turn": float(np.degrees(turn))}
-    return Notice("WRONG_ZERO", numbers=numbers, remedies=(zeroed(log.origin, turn, half), anyway))
+    yield Notice("WRONG_ZERO", numbers=numbers, remedies=(zeroed(log.origin, turn, half), anyway))
 
 
 def _certainty(fit: Fit, name: str) -> float:

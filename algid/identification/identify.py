@@ -210,10 +210,10 @@ def _identified(
     with one_blas_thread():
         if settles(settings.estimator):
             outcome = _by_the_paper(survey, settings, earlier, folder)
-        elif series:
-            outcome, settings = _by_likelihood(survey, settings, earlier, stated, folder)
         else:
-            outcome, settings = _by_likelihood(survey, settings, earlier, stated)
+            outcome, settings = _by_likelihood(
+                survey, settings, earlier, stated, folder if series else None
+            )
         result = result_of(outcome, settings, survey)
     notices = result.notices
     if earlier is not None:
@@ -237,15 +237,13 @@ def _by_the_paper(
             )
     known = None
     if earlier is not None:
-        known = np.empty(len(CONSTANT_NAMES))
-        for place, name in enumerate(CONSTANT_NAMES):
-            constant = earlier.result.parameters.get(name)
-            if constant is None or constant.estimate is None:
-                raise ResultError(
-                    f"{earlier.file}: the result lacks a constant; identify the arm from a better "
-                    "log first"
-                )
-            known[place] = constant.estimate
+        found = [earlier.result.parameters.get(name) for name in CONSTANT_NAMES]
+        known = np.array([one and one.estimate for one in found], dtype=np.float64)
+        if np.isnan(known).any():
+            raise ResultError(
+                f"{earlier.file}: the result lacks a constant; identify the arm from a better log "
+                "first"
+            )
     first, first_loaded = _firsts(survey)
     return run_paper(survey, first, first_loaded, settings, known, folder)
 
@@ -278,13 +276,10 @@ def _by_likelihood(
         found = replace(found, fit=with_prior(found.fit, said))
     survey.begin("prediction")
     outcome = outcome_of(found)
-    notices = outcome.notices + of_driver
-    turned = None
+    turned: Iterable[Notice] = ()
     if earlier is None and not _zero_is_stated(survey.logs[0], stated):
         turned = turn_note(found.fit, survey.logs[0])
-    if turned is not None:
-        notices = [turned, *notices]
-    outcome = replace(outcome, notices=notices)
+    outcome = replace(outcome, notices=[*turned, *outcome.notices, *of_driver])
     if folder is not None:
         survey.begin("series")
         write_fit_series(folder, found, residual_of(found))

@@ -188,12 +188,21 @@ class Recordings:
         Of several logs of a role the conventions are judged together, and only where what they
         come to is `doubtful`: a fit that holds and obeys physics has no other convention.
         """
+        from algid.inspection.conventions import mends
+
         seen = self.whole(log).notices
         if self._conventions is None:
             self._conventions = {}
-            if doubtful:
-                for role in (self.unloaded, self.loaded):
-                    self._conventions |= self._judged(role)
+            for logs in (self.unloaded, self.loaded) if doubtful else ():
+                known = [one for one in logs if one in self._recorded]
+                if known:
+                    parts = [(one.origin, self._recorded.pop(one)) for one in known]
+                    mended = mends(parts, gravity=known[0].weight > 0)
+                    self._conventions |= {
+                        one: notice
+                        for one, notice in zip(known, mended, strict=True)
+                        if notice is not None
+                    }
         convention = self._conventions.get(log)
         if convention is None:
             return seen
@@ -223,17 +232,6 @@ class Recordings:
             mapping=dict(log.origin.mapping),
             reading=log.origin.reading,
         )
-
-    def _judged(self, logs: Sequence[Recording]) -> dict[Recording, Notice]:
-        """What is wrong with the conventions of each of several logs."""
-        from algid.inspection.conventions import mends
-
-        known = [log for log in logs if log in self._recorded]
-        if not known:
-            return {}
-        parts = [(log.origin, self._recorded.pop(log)) for log in known]
-        mended = zip(known, mends(parts, gravity=known[0].weight > 0), strict=True)
-        return {log: notice for log, notice in mended if notice is not None}
 
     def _blocks(self, log: Recording) -> Iterator[Log]:
         """The log's blocks, each counted.

@@ -164,17 +164,6 @@ def information_blocks(fit: Fit, durations: Sequence[float]) -> Iterator[dict[st
         yield columns | dict(zip(fit.names, summed, strict=True))
 
 
-def running_columns(fit: Fit, durations: Sequence[float]) -> dict[str, FloatArray]:
-    """Each shared parameter by time of each log, half its 95 % interval, from all logs so far."""
-    course = running(fit, durations)
-    lengths = np.array(durations)[course.log]
-    columns = {"log": course.log, "t": course.share * lengths}
-    columns |= dict(zip(fit.names, course.beta.T, strict=True))
-    for name, half in zip(fit.names, course.half.T, strict=True):
-        columns[f"{name}_half"] = half
-    return columns
-
-
 WHITE_SPECTRUM = "whitened spectrum"
 SPECTRUM = "spectrum"
 TORQUE_SPECTRUM = "torque spectrum"
@@ -256,7 +245,7 @@ def write_fit_series(folder: Path, found: Fitted, residual: ResidualSums | None)
     if every:
         write_columns(folder / "information.parquet", information_blocks(fit, durations), starts)
     if every and has_running(fit):
-        write_columns(folder / "running.parquet", [running_columns(fit, durations)], starts)
+        write_columns(folder / "running.parquet", [running(fit, durations)], starts)
     if residual is not None:
         rows = innovation_rows(residual, whitened=bool(fit.residual))
         write_columns(folder / "innovations.parquet", rows, starts)

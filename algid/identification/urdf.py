@@ -83,9 +83,6 @@ def _arm(robot: ET.Element) -> tuple[Arm, tuple[float, ...]]:
     joints = robot.findall("joint")
     ends = [(_text(one, "parent", "link"), _text(one, "child", "link")) for one in joints]
     children = [child for _, child in ends]
-    lost = {name for both in ends for name in both} - links.keys()
-    if lost or len(set(children)) < len(children):
-        raise ValueError(f"there is no link {lost.pop()}" if lost else "a link hangs twice")
     moving = [place for place, one in enumerate(joints) if _text(one, "", "type") != "fixed"]
     kinds = {_text(joints[place], "", "type") for place in moving}
     if len(moving) != 2 or not kinds <= {"revolute", "continuous"}:
@@ -99,8 +96,10 @@ def _arm(robot: ET.Element) -> tuple[Arm, tuple[float, ...]]:
                 frame, after = frames[parent]
                 own = _origin(joints[place], "origin")
                 frames[child] = frame @ own, after + (place in moving)
-    if len(frames) < len(links):
-        raise ValueError("a link is fixed to itself")
+    astray = [name for name in children if children.count(name) > 1]
+    astray += sorted(frames.keys() ^ links.keys())
+    if astray:
+        raise ValueError(f"there is no link {astray[0]}, or none that it hangs on, or two")
     moving.sort(key=lambda place: frames[children[place]][1])
     names = [children[place] for place in moving]
     if [frames[name][1] for name in names] != [1, 2]:
@@ -189,12 +188,11 @@ def _inertial(link: ET.Element) -> tuple[FloatArray, FloatArray, float]:
 
 def _origin(element: ET.Element, path: str) -> FloatArray:
     """The origin (4, 4) at `path`: roll, pitch, yaw about fixed axes, and its place."""
-    angles = np.array(_numbers(element, path, "rpy", "0 0 0", 3))
-    (a, b, c), (p, q, r) = np.cos(angles), np.sin(angles)
-    about_x = np.array([[1, 0, 0], [0, a, -p], [0, p, a]])
-    about_y = np.array([[b, 0, q], [0, 1, 0], [-q, 0, b]])
-    about_z = np.array([[c, -r, 0], [r, c, 0], [0, 0, 1]])
     frame = np.eye(4)
-    frame[:3, :3] = about_z @ about_y @ about_x
+    for axis, angle in enumerate(_numbers(element, path, "rpy", "0 0 0", 3)):
+        turn, rows = np.eye(3), [(axis + 1) % 3, (axis + 2) % 3]
+        c, s = math.cos(angle), math.sin(angle)
+        turn[np.ix_(rows, rows)] = [[c, -s], [s, c]]
+        frame[:3, :3] = turn @ frame[:3, :3]
     frame[:3, 3] = _numbers(element, path, "xyz", "0 0 0", 3)
     return frame

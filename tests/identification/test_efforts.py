@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from algid.api.identify import identify
-from algid.arm import FloatArray, inverse_dynamics, passive_torque
+from algid.arm import CONSTANT_NAMES, FloatArray, inverse_dynamics, passive_torque
 from algid.base.errors import LogError, SettingError
 from algid.identification.known import prior_of
 from algid.identification.validate import predictor_of
@@ -23,6 +23,7 @@ from algid.settings import Settings
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
+from tests.intervals import distances
 from tests.readers.headers import opened
 
 RATE, DURATION = 250.0, 3.0
@@ -87,13 +88,10 @@ def told(effort: str) -> Result:
 
 
 def right(result: Result, names: str = "m_p l1 l2") -> None:
-    truth = dict(zip(("k1", "k2", "k3", "k4", "k5", "k6", "k7"), ARM.tolist(), strict=True))
+    truth = dict(zip(CONSTANT_NAMES, ARM.tolist(), strict=True))
     truth |= {"m_p": CASE.payload, "l1": CASE.arm.l1, "l2": CASE.arm.l2}
-    for name in names.split():
-        found = result.estimates[name]
-        assert found.estimate is not None
-        assert found.std
-        assert abs(found.estimate - truth[name]) < CHANCE * found.std, name
+    wanted = [truth[name] for name in names.split()]
+    assert np.abs(distances(result, wanted, names.split())).max() < CHANCE
 
 
 def codes(result: Result) -> set[str]:

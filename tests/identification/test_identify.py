@@ -13,7 +13,6 @@ import pytest
 from scipy.signal import lfilter
 
 import algid
-from algid.arm import CONSTANT_NAMES
 from algid.base.errors import LogError
 from algid.identification.identify import identify
 from algid.identification.open_logs import open_source
@@ -27,6 +26,7 @@ from algid.synth.simulator import simulate
 from pipelines.accuracy_scenes import random_arm
 from pipelines.saturation import log_of
 from tests.inspection.test_checks import noticed
+from tests.intervals import distances, holding
 
 PAPER = Settings(estimator="paper")
 WEAK = Settings(estimator="weak", model="plain")
@@ -164,13 +164,10 @@ def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) 
         Settings(model="coulomb", estimator=result.estimator),
         profile=profile,
     )
-    for name, found in own.parameters.items():
-        shown = result.parameters[name]
-        assert found.estimate is not None
-        assert shown.estimate is not None
-        assert found.std is not None
-        # iterations from another start
-        assert abs(shown.estimate - found.estimate) < 0.1 * found.std
+    # iterations from another start
+    names = list(own.parameters)
+    shown = [result.parameters[name].estimate or np.nan for name in names]
+    assert np.abs(distances(own, shown, names)).max() < 0.1
     assert (
         f"by the {result.estimator} estimator in place of the refined one"
         in result.verdict.sentence
@@ -251,9 +248,7 @@ def test_intervals_hold_where_a_noise_free_torque_has_corners_between_samples() 
     for arm, seed in (("arm22", 1), ("arm24", 4)):
         k, log = log_of(arm, "true", 0.7, seed)
         result = algid.identify(log.part(0, len(log) // 2))
-        for name, true in zip(CONSTANT_NAMES, k, strict=True):
-            low, high = result.parameters[name].ci95 or (np.nan, np.nan)
-            inside.append(low <= true <= high)
+        inside.append(holding(result, k))
     # 14 intervals of 95 %: fewer than 12 hold in 1 of 30 sets
     assert sum(inside) >= 12
 
@@ -275,8 +270,20 @@ def test_intervals_hold_behind_a_one_pole_low_pass_of_several_samples() -> None:
         theta = motion.theta + 3e-4 * rng.standard_normal(motion.theta.shape)
         result = algid.identify(Log.from_arrays(t[::10], theta[:, ::10], logged[:, ::10]))
         assert result.verdict.grade == "good"
-        for name, true in zip(CONSTANT_NAMES, arm.constants(), strict=True):
-            low, high = result.parameters[name].ci95 or (np.nan, np.nan)
-            inside.append(low <= true <= high)
+        inside.append(holding(result, arm.constants()))
     # 14 intervals of 95 %: fewer than 11 hold in 1 of 300 sets
     assert sum(inside) >= 11
+
+
+def test_a_log_too_short_beside_a_good_one_still_gives_a_report(tmp_path: Path) -> None:
+    log, _ = algid.synthesise("case1", duration=2.0, torque="wide", sensors=Sensors(1e-3, 1e-2))
+    short = replace(
+        log, stamp_ns=log.stamp_ns[:30], theta=log.theta[:, :30], tau=log.tau[:, :30], omega=None
+    )
+    result = identify(
+        [log, short], settings=Settings(estimator="weak", model="plain"), out=tmp_path, name="both"
+    )
+    assert result.parameters["k1"].status == "OK"
+    page = (tmp_path / "both.algid/report.html").read_text(encoding="utf-8")
+    assert 'id="torque"' in page
+    assert 'id="information"' not in page

@@ -50,7 +50,6 @@ def test_one_log_as_unloaded_and_as_loaded_is_told_in_one_line(tmp_path: Path) -
         ((), 0.0),
         (("--gravity", "9.81"), 9.81),
         (("--set", "gravity=3.7"), 3.7),
-        (("--gravity", "1.6"), 1.6),
     ],
 )
 def test_gravity_flag_over_profile_over_default(

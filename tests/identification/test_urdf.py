@@ -89,8 +89,16 @@ def test_an_arm_from_cad_moves_as_pinocchio_says(tmp_path: Path) -> None:
         ('damping="0.2"', 'damping="-inf"', "expected 1 finite number, found '-inf'"),
         ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>', "axis has no direction"),
         ('<link name="hand">', '<link name="other">', "there is no link hand"),
-        ('<child link="hand"/>', '<child link="forearm"/>', "a link hangs twice"),
-        ('<parent link="world"/>', '<parent link="stand"/>', "a link is fixed to itself"),
+        (
+            '<child link="hand"/>',
+            '<child link="forearm"/>',
+            "no link forearm, or none .*, or two",
+        ),
+        (
+            '<parent link="world"/>',
+            '<parent link="stand"/>',
+            "there is no link arm, or none",
+        ),
         ("0 0.4 0.02", "0 0.4", "expected 3 finite numbers, found '0 0.4'"),
         ("0 0.4 0.02", "0 0 0.02", "link arm has no length"),
     ],
