@@ -74,13 +74,13 @@ def draft_profile(found: Inspection) -> str:
     For one that cannot be read yet, its names stand in comments.
     """
     reading, mapping = found.reading, found.mapping or {}
-    first_topic, *_ = *reading.topics, ""
-    own_time = "" if first_topic else mapping.get("t")
+    main, *_ = *reading.topics, ""
+    is_column = mapping.get("t") in [one.name for one in found.entries]
     text = _filled(
         _HEAD,
-        topic=first_topic,
+        topic=main,
         joints=reading.joints,
-        time=own_time,
+        time=mapping["t"] if is_column else "",
         time_unit=reading.time_unit,
     )
     if found.refused:
@@ -88,11 +88,10 @@ def draft_profile(found: Inspection) -> str:
     for one in found.entries[:64]:
         text += f"# in the log: {visible(one.name, 80)} ({visible(one.type, 60)})\n"
     for name in CHANNELS:
-        source, topic = mapping.get(name, ""), ""
-        if first_topic:
-            topic, _, source = source.partition(": ")
-        other = "" if topic == first_topic else topic
-        own = _filled(_CHANNEL, source=source, topic=other)
+        source = mapping.get(name, "")
+        topic = next((one for one in reading.topics if source.startswith(f"{one}: ")), "")
+        source, other = source.removeprefix(f"{topic}: "), topic != main
+        own = _filled(_CHANNEL, source=source, topic=topic if other else "")
         text += f"\n[{name}]\n{own}{_UNITS[name[:-1]]}"
     return text
 

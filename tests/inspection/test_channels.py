@@ -5,20 +5,21 @@ each limit.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from functools import partial
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from algid.arm import FloatArray
 from algid.base.errors import LogError
-from algid.inspection.channels import angles, degrees, efforts, held_efforts, spikes, stuck
+from algid.estimators.conventions import AS_READ
+from algid.inspection.checks import examine
 from algid.inspection.figures import saturated_share
-from algid.inspection.sampling import lost_steps, rests, samples_a_period, sampling
+from algid.inspection.sampling import lost_steps, samples_a_period
 from algid.log import ChannelReading, Log, Origin, Reading
-from algid.notices import Notice
-from tests.inspection.test_checks import noticed
+from algid.notices import of_codes
+from tests.inspection.test_checks import noticed, of_signals
 
 ROWS = 2000
 T = np.arange(ROWS) * 1e-3
@@ -78,10 +79,6 @@ def turning(first: float, second: float, reading: Reading | None = None) -> Log:
     return logged(second * theta2, theta1=first * theta1, omega=rate, reading=reading)
 
 
-def never() -> bool:
-    raise AssertionError("physics is asked where the velocities tell nothing")
-
-
 def overshot() -> FloatArray:
     """A torque that is on its way to a step's end for a sample."""
     tau = -20.0 * T + 1e-3 * NOISE[0]
@@ -90,91 +87,95 @@ def overshot() -> FloatArray:
     return tau
 
 
-SPOKEN = partial(degrees, is_to_scale=never)
+EFFORTS = ("EFFORT_ZERO", "SATURATED_EFFORT")
+STUCK = ("SENSOR_FAULT:torque", "SENSOR_FAULT:angle")
+ANGLES = ("WRAPPED_ANGLE", "HARDLY_DRIVEN")
+SCALES = ("DEGREES",)
+SPIKES = ("SENSOR_FAULT:spikes",)
+SAMPLING = ("SHORT_LOG", "SLOW_SAMPLING", "UNEVEN_STAMPS", "LOST_SAMPLES", "GAPS")
 WIDE = -6.1 * TURN * T / T[-1]
 FROZEN = np.concatenate([T[:600], np.full(21, T[600]), T[621:]])
 RESTED = np.concatenate([T[:600], np.full(300, T[599]), T[600 : ROWS - 300]])
-TOLD: list[tuple[Callable[..., Iterable[Notice]], Log, str]] = [
-    (efforts, logged(tau2=0 * T, mapping={"tau2": "eff"}), "tau2 (eff) is zero in every sample"),
-    (efforts, logged(tau2=3.14159e-7 * np.sin(T)), "tau2 never exceeds 3.14e-07 N m: no torque"),
-    (efforts, logged(tau2=np.full(ROWS, -2.5)), "tau2 is -2.5 N m in every sample"),
-    (efforts, logged(tau2=1e-6 * np.cos(T)), ""),
-    (efforts, logged(tau2=0.999e-6 * np.cos(T)), "tau2 never exceeds 9.99e-07 N m: no torque"),
-    (efforts, logged(tau2=0 * T, reading=Reading(passive=2)), ""),
+TOLD: list[tuple[tuple[str, ...], Log, str]] = [
+    (EFFORTS, logged(tau2=0 * T, mapping={"tau2": "eff"}), "tau2 (eff) is zero in every sample"),
+    (EFFORTS, logged(tau2=3.14159e-7 * np.sin(T)), "tau2 never exceeds 3.14e-07 N m: no torque"),
+    (EFFORTS, logged(tau2=np.full(ROWS, -2.5)), "tau2 is -2.5 N m in every sample"),
+    (EFFORTS, logged(tau2=1e-6 * np.cos(T)), ""),
+    (EFFORTS, logged(tau2=0.999e-6 * np.cos(T)), "tau2 never exceeds 9.99e-07 N m: no torque"),
+    (EFFORTS, logged(tau2=0 * T, reading=Reading(passive=2)), ""),
     # of a run of n samples at the limit n - 2 have neighbours there
-    (efforts, logged(tau1=with_run(np.sin(3 * T) / 9 - 1, 21)), ""),
+    (EFFORTS, logged(tau1=with_run(np.sin(3 * T) / 9 - 1, 21)), ""),
     (
-        efforts,
+        EFFORTS,
         logged(tau1=with_run(np.sin(3 * T) / 9 - 1, 23)),
         "tau1 stands at its limit in 1.05 % of the samples",
     ),
     (
-        stuck,
+        STUCK,
         logged(tau2=with_run(np.sin(40 * T), 400)),
         "tau2 stands still for 0.4 s from t = 0.5 s; leave that out",
     ),
     (
-        stuck,
+        STUCK,
         logged(tau2=with_run(np.sin(40 * T), 100)),
         "tau2 stands still for 0.1 s from t = 0.5 s; leave that out",
     ),
-    (stuck, logged(tau2=with_run(np.sin(40 * T), 99)), ""),  # a tenth of a second is the least
+    (STUCK, logged(tau2=with_run(np.sin(40 * T), 99)), ""),  # a tenth of a second is the least
     # a run of 400 samples is 20 usual ones where each value stands 20 times
     (
-        stuck,
+        STUCK,
         logged(tau2=published(20)),
         "tau2 stands still for 0.4 s from t = 0.4 s; leave that out",
     ),
-    (stuck, logged(tau2=published(21)), ""),
-    (stuck, logged(tau2=published(50)), ""),
-    (stuck, logged(FROZEN), "theta2 freezes for 0.021 s from t = 0.6 s, then jumps"),
-    (stuck, logged(np.concatenate([FROZEN[:619], T[619:]])), ""),
-    (stuck, logged(RESTED), ""),  # it stood still, and went on as before
-    (angles, logged(np.linspace(0, TURN + 1, ROWS) % TURN), "theta2 jumps by a turn 1 time"),
-    (angles, logged(np.linspace(0, 3 * TURN + 1, ROWS) % TURN), "theta2 jumps by a turn 3 times"),
-    (angles, logged(np.linspace(0, 3 * TURN + 1, ROWS)), ""),
+    (STUCK, logged(tau2=published(21)), ""),
+    (STUCK, logged(tau2=published(50)), ""),
+    (STUCK, logged(FROZEN), "theta2 freezes for 0.021 s from t = 0.6 s, then jumps"),
+    (STUCK, logged(np.concatenate([FROZEN[:619], T[619:]])), ""),
+    (STUCK, logged(RESTED), ""),  # it stood still, and went on as before
+    (ANGLES, logged(np.linspace(0, TURN + 1, ROWS) % TURN), "theta2 jumps by a turn 1 time"),
+    (ANGLES, logged(np.linspace(0, 3 * TURN + 1, ROWS) % TURN), "theta2 jumps by a turn 3 times"),
+    (ANGLES, logged(np.linspace(0, 3 * TURN + 1, ROWS)), ""),
     # a joint may turn round while nothing is recorded; a gap that is filled in hides a wrap
-    (angles, logged(jumped(1), stamps=late(6)), ""),
-    (angles, logged(jumped(1), stamps=late(4)), "theta2 jumps by a turn 1 time"),
-    (angles, logged(jumped(0.89)), ""),
-    (angles, logged(jumped(0.92)), "theta2 jumps by a turn 1 time"),
-    (angles, logged(jumped(1.08)), "theta2 jumps by a turn 1 time"),
-    (angles, logged(jumped(1.11)), ""),
+    (ANGLES, logged(jumped(1), stamps=late(6)), ""),
+    (ANGLES, logged(jumped(1), stamps=late(4)), "theta2 jumps by a turn 1 time"),
+    (ANGLES, logged(jumped(0.89)), ""),
+    (ANGLES, logged(jumped(0.92)), "theta2 jumps by a turn 1 time"),
+    (ANGLES, logged(jumped(1.08)), "theta2 jumps by a turn 1 time"),
+    (ANGLES, logged(jumped(1.11)), ""),
     (
-        angles,
+        ANGLES,
         logged(theta1=np.full(ROWS, 0.5), mapping={"theta1": "q[0]"}),
         "theta1 (q[0]) is 0.5 rad in every sample",
     ),
-    (SPOKEN, turning(1, 0.82 * DEGREE), "angles of joint 2 are in degrees by the other signal"),
-    (SPOKEN, turning(1, 1.22 * DEGREE), "angles of joint 2 are in degrees by the other signal"),
-    (SPOKEN, turning(1, 1 / DEGREE), "velocities of joint 2 are in degrees by the other signal"),
-    (SPOKEN, turning(1, 0.78 * DEGREE), ""),
-    (SPOKEN, turning(1, 1.28 * DEGREE), ""),
-    (SPOKEN, turning(1, 1), ""),
+    (SCALES, turning(1, 0.82 * DEGREE), "angles of joint 2 are in degrees by the other signal"),
+    (SCALES, turning(1, 1.22 * DEGREE), "angles of joint 2 are in degrees by the other signal"),
+    (SCALES, turning(1, 1 / DEGREE), "velocities of joint 2 are in degrees by the other signal"),
+    (SCALES, turning(1, 0.78 * DEGREE), ""),
+    (SCALES, turning(1, 1.28 * DEGREE), ""),
+    (SCALES, turning(1, 1), ""),
     (
-        SPOKEN,
+        SCALES,
         turning(DEGREE, 1, Reading(channels={"theta1": ChannelReading("q1", "rad", "flag")})),
         "angles of joint 1 are in degrees by the other signal; they are taken for rad as configur",
     ),
-    (SPOKEN, logged(5.9 / 6.1 * WIDE), ""),
+    (SCALES, logged(5.9 / 6.1 * WIDE), ""),
     (
-        partial(degrees, is_to_scale=lambda: False),
+        SCALES,
         logged(WIDE, omega=np.zeros((2, ROWS))),  # velocities that say nothing are none
         "angles reach 38.33: few arms turn that far in rad",
     ),
-    (partial(degrees, is_to_scale=lambda: True), logged(WIDE), ""),
-    (spikes, logged(tau2=overshot()), ""),
+    (SPIKES, logged(tau2=overshot()), ""),
     (
-        sampling,
+        SAMPLING,
         logged(np.sin(T), stamps=late(251, 500) + late(1501, 1200) - T),
         "2 gaps, the longest 1.501 s; no window spans one",
     ),
-    (sampling, logged(np.sin(TURN * np.arange(ROWS) / math.sqrt(94))), "9.7 samples"),
-    (sampling, logged(np.sin(TURN * np.arange(ROWS) / math.sqrt(106))), ""),
-    (sampling, logged(stamps=late(2.4)), "stamps jitter"),  # a step of 2.4 periods is no gap
-    (sampling, logged(stamps=T[:1001]), ""),
+    (SAMPLING, logged(np.sin(TURN * np.arange(ROWS) / math.sqrt(94))), "9.7 samples"),
+    (SAMPLING, logged(np.sin(TURN * np.arange(ROWS) / math.sqrt(106))), ""),
+    (SAMPLING, logged(stamps=late(2.4)), "stamps jitter"),  # a step of 2.4 periods is no gap
+    (SAMPLING, logged(stamps=T[:1001]), ""),
     (
-        sampling,
+        SAMPLING,
         logged(stamps=T[:1000]),
         "the log lasts 0.999 s; an estimate needs a second of motion at least, ten are better",
     ),
@@ -183,20 +184,28 @@ TOLD: list[tuple[Callable[..., Iterable[Notice]], Log, str]] = [
 
 @pytest.mark.parametrize("row", range(len(TOLD)))
 def test_what_a_check_tells_is_what_was_put_in(row: int) -> None:
-    check, log, text = TOLD[row]
-    told = [one.text for one in check(log)]
+    codes, log, text = TOLD[row]
+    told = [one.text for one in of_codes(of_signals(log), *codes)]
     assert len(told) == bool(text)
     assert all(one.startswith(text) for one in told)
+
+
+def test_angles_of_many_turns_are_read_where_physics_holds() -> None:
+    right = SimpleNamespace(convention=AS_READ, convincing=True, names=())
+    judged: Any = SimpleNamespace(as_read=right, best=right, alone=False)
+    assert not of_codes(examine(logged(WIDE), lambda: judged), *SCALES)
 
 
 def test_what_is_no_torque_is_told_with_what_names_another() -> None:
     name = "name the measured torque: --set tau{}.source=NAME"
     nevertheless = "to use it nevertheless: --accept EFFORT_ZERO"
-    (zero,) = efforts(logged(tau2=0 * T))
+    (zero,) = of_codes(of_signals(logged(tau2=0 * T)), "EFFORT_ZERO")
     assert zero.refuse
     passive = "for a joint without a motor: --set passive=2"
     assert zero.advice == f"{name.format(2)}; {passive}; {nevertheless}"
-    none = efforts(logged(tau1=0 * T, tau2=0 * T))  # a passive joint needs another's motor
+    none = of_codes(
+        of_signals(logged(tau1=0 * T, tau2=0 * T)), "EFFORT_ZERO"
+    )  # a passive joint needs another's motor
     assert [one.advice for one in none] == [f"{name.format(j)}; {nevertheless}" for j in (1, 2)]
 
 
@@ -209,7 +218,7 @@ def test_what_is_no_torque_is_told_with_what_names_another() -> None:
     ],
 )
 def test_what_is_in_degrees_is_told_with_its_flags(log: Log, unit: str, name: str) -> None:
-    (found,) = degrees(log, lambda: False)
+    (found,) = of_codes(of_signals(log), "DEGREES")
     assert found.refuse
     assert [one.settings for one in found.remedies] == [
         {unit: "deg"}, {f"{name}.gear_ratio": None}, {"accept": "DEGREES"},
@@ -220,7 +229,7 @@ def test_what_is_in_degrees_is_told_with_its_flags(log: Log, unit: str, name: st
 def test_spikes_are_counted_in_every_channel(name: str) -> None:
     every = dict(zip(("theta1", "theta2", "tau1", "tau2"), np.sin(T) + 1e-3 * NOISE, strict=True))
     every[name][[250, 900, 1300]] += 1.0
-    (found,) = spikes(logged(**every))
+    (found,) = of_codes(of_signals(logged(**every)), *SPIKES)
     assert found.text == f"{name} has 3 spikes, the first at t = 0.25 s"
 
 
@@ -259,7 +268,7 @@ def test_steps_twice_as_long_are_counted(lost: int, told: int) -> None:
 
 
 def test_a_wrap_is_told_with_what_undoes_it() -> None:
-    (found,) = angles(logged(jumped(1)))
+    (found,) = of_codes(of_signals(logged(jumped(1))), *ANGLES)
     assert found.refuse
     assert found.clause == (
         "theta2 jumps by a turn 1 time: --set theta2.unwrap=true; "
@@ -274,7 +283,8 @@ def test_jitter_is_told_with_what_resampling_costs() -> None:
     tenth = np.arange(ROWS) % 10 == 5
     for noise, note in ((0.0, False), (1e-4, True)):  # less than the angles' own noise
         theta1, theta2 = 40 * T**2 + noise * NOISE[0], 0.1 * T + noise * NOISE[1]
-        (one,) = sampling(logged(theta2, theta1=theta1, stamps=T + 0.2e-3 * tenth))
+        log = logged(theta2, theta1=theta1, stamps=T + 0.2e-3 * tenth)
+        (one,) = of_codes(of_signals(log), *SAMPLING)
         assert (one.code, one.note) == ("UNEVEN_STAMPS", note)
         assert one.numbers["jitter"] == pytest.approx(0.2 * math.sqrt(0.2), rel=1e-2)
         assert note or one.numbers["error"] == pytest.approx(80 * 1e-6 / 8)
@@ -283,7 +293,7 @@ def test_jitter_is_told_with_what_resampling_costs() -> None:
             "rad at most, linearly"
         )
     for late, jitters in ((0.022e-3, False), (0.0228e-3, True)):
-        assert bool([*sampling(logged(stamps=T + late * tenth))]) == jitters
+        assert bool(of_codes(of_signals(logged(stamps=T + late * tenth)), *SAMPLING)) == jitters
 
 
 @pytest.mark.parametrize(
@@ -301,7 +311,8 @@ def test_rest_lasts_until_a_thousandth_of_the_way(before: float, after: float, f
     t = np.arange(round(1000 * (before + 2.5 + after)) + 1) * 1e-3
     pair = np.stack([np.clip(t - before, 0, 2.5), 0 * t])
     stamp_ns = np.arange(t.size) * 10**6
-    found = [*rests(Log(stamp_ns, pair, pair, Origin("arm.csv", "csv", {})), True)]
+    log = Log(stamp_ns, pair, pair, Origin("arm.csv", "csv", {}))
+    found = of_codes(of_signals(log), "RESTS")
     assert [one.remedies[0].words for one in found] == [flags] * bool(flags)
     assert all(one.note for one in found)
 
@@ -324,19 +335,18 @@ def slowed(values: FloatArray, step: int) -> FloatArray:
 
 @pytest.mark.parametrize("step", [2, 10, 20])
 def test_a_held_torque_is_told_with_what_it_is_late(step: int) -> None:
-    (found,) = held_efforts(logged(tau2=slowed(np.cos(2 * T) + T, step)))
+    (found,) = of_codes(of_signals(logged(tau2=slowed(np.cos(2 * T) + T, step))), "HELD_EFFORT")
     assert (found.code, found.note, found.refuse) == ("HELD_EFFORT", False, False)
     assert found.numbers["held"] == pytest.approx(step)
     assert found.numbers["late"] == pytest.approx((step - 1) / 2)  # mean of 0 … step - 1 samples
 
 
 def test_coarse_counts_and_logs_that_are_slow_as_a_whole_are_not_held() -> None:
-    assert not [*held_efforts(logged())]
+    logs = [logged(slowed(np.cos(T), 10), slowed(np.cos(2 * T), 10))]
     for count in (1e-3, 1e-2, 0.1):  # of sines of amplitude one and more, with and without noise
         for noise in (0 * T, 0.3 * count * NOISE[0]):
-            tau = count * np.rint((np.sin(np.cos(T)) + noise) / count)
-            assert not [*held_efforts(logged(tau2=tau))]
-    assert not [*held_efforts(logged(slowed(np.cos(T), 10), slowed(np.cos(2 * T), 10)))]
+            logs.append(logged(tau2=count * np.rint((np.sin(np.cos(T)) + noise) / count)))
+    assert not [one for log in logs for one in of_codes(of_signals(log), "HELD_EFFORT")]
 
 
 def test_dry_friction_makes_no_spikes_and_a_bus_does() -> None:
@@ -347,9 +357,9 @@ def test_dry_friction_makes_no_spikes_and_a_bus_does() -> None:
     assert np.sign(omega[turn - 1 : turn + 2]).tolist() == [1, -1, 1]
     theta = np.cumsum(omega) * (T[1] - T[0]) + 3e-4 * NOISE[0]
     tau = 10 * np.sin(2 * math.pi * T) + 4 * np.tanh(omega / 1e-7) + 1e-2 * NOISE[1]
-    assert [*spikes(logged(theta, tau))] == []
+    assert not of_codes(of_signals(logged(theta, tau)), *SPIKES)
     tau[turn + 40] += 8.0
-    (found,) = spikes(logged(theta, tau))
+    (found,) = of_codes(of_signals(logged(theta, tau)), *SPIKES)
     assert found.numbers["count"] == 1
 
 

@@ -114,11 +114,8 @@ def test_inspect_of_a_refused_mcap_shows_joints_and_fields(tmp_path: Path) -> No
 
 def test_what_inspect_prints_is_what_a_profile_takes(tmp_path: Path) -> None:
     stamps = [EPOCH_NS + step * 1_000_000 for step in range(10)]
-    for topic in ("/one", "/two"):
-        messages = [
-            (topic, one, joint_state(one, ["a", "b"], [1, 2], [], [3, 4]).done()) for one in stamps
-        ]
-        write_mcap(tmp_path / f"{topic[1:]}.mcap", messages)
+    states = [joint_state(one, ["a", "b"], [1, 2], [], [3, 4]).done() for one in stamps]
+    write_mcap(tmp_path / "one.mcap", [("/one", *one) for one in zip(stamps, states, strict=True)])
     first = read_log(tmp_path / "one.mcap")
     sources = {
         name: {"source": first.origin.mapping[name]}
