@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import shutil
 import time
@@ -70,9 +69,7 @@ class Browser:
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
         self.driver = webdriver.Chrome(options=options, service=Service(DRIVER))
 
-    def look(
-        self, page: Path, width: int = 1400, dark: bool = False, picture: Path | None = None
-    ) -> Seen:
+    def look(self, page: Path, width: int = 1400, dark: bool = False) -> Seen:
         """Open `page`, wait until its figures are drawn, and look."""
         self._set_screen(width, 1000, dark)
         self.driver.get("about:blank")
@@ -80,15 +77,12 @@ class Browser:
         self._log("browser")
         self.driver.get(page.resolve().as_uri())
         self.until("return document.documentElement.dataset.drawn !== undefined")
-        if picture is not None:
-            self._take(picture, width, dark)
         run = self.driver.execute_script
         return Seen(
             drawn=int(run("return document.documentElement.dataset.drawn || 0")),
             failed=int(run("return document.documentElement.dataset.failed || 0")),
             panels=run(
-                "return document.querySelectorAll('.plot .main-svg').length && "
-                "[...document.querySelectorAll('.plot')].filter((p) => "
+                "return [...document.querySelectorAll('.plot')].filter((p) => "
                 "p.querySelector('.main-svg')).length"
             ),
             requests=self._requests(),
@@ -129,10 +123,3 @@ class Browser:
     def _log(self, kind: str) -> list[dict[str, Any]]:
         entries: list[dict[str, Any]] = self.driver.get_log(kind)  # type: ignore[no-untyped-call]
         return entries
-
-    def _take(self, picture: Path, width: int, dark: bool) -> None:
-        height = self.driver.execute_script("return document.documentElement.scrollHeight")
-        self._set_screen(width, height, dark)
-        time.sleep(0.5)  # the figures fit themselves to the new screen
-        shot = self.driver.execute_cdp_cmd("Page.captureScreenshot", {"format": "png"})
-        picture.write_bytes(base64.b64decode(shot["data"]))

@@ -9,7 +9,6 @@ import html
 import json
 import re
 import shutil
-from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -18,7 +17,6 @@ import pytest
 
 from algid.base.errors import ResultError
 from algid.base.verdict import Verdict
-from algid.notices import Notice
 from algid.report.document import Document, Section, Table
 from algid.report.page import write_pages
 from algid.report.render import library, markdown
@@ -193,24 +191,18 @@ def test_no_status_of_a_failed_result_is_good(folder: Path, result: Result) -> N
     assert "whole ok" not in failed.text
 
 
-def document() -> Document:
-    reasons = tuple(Notice("A", f"reason {place}", logs=("a.csv",)) for place in range(5))
-    verdict = Verdict("reservations", "k1 is known", reasons, (Notice("B", "a note", note=True),))
-    table = Table("T & Co", "A | N", (("x|y", "1"),), "a note")
-    parts = (
-        Section("one", "One", (table,)),
-        Section("none", "None", (Table("empty", "A", ()), ())),
-        Section("two", "Two", ("a sentence", ("first", "second"), table), folded=True),
-    )
-    return Document(verdict, parts, "kicker", "name", "facts")
-
-
 def test_markdown_has_every_table_and_a_command_that_can_be_copied() -> None:
     command = "algid identify 'a `b` ```c```.csv' --force"
     failed = Verdict("failed", "it failed", command=command)
-    text = markdown(replace(document(), verdict=failed))
+    table = Table("T & Co", "A | N", [("x|y", "1")], "a note")
+    parts = [
+        Section("one", "One", [table]),
+        Section("none", "None", [Table("empty", "A", ()), ()]),
+        Section("two", "Two", ["a sentence", table], folded=True),
+    ]
+    text = markdown(Document(failed, parts, "a kicker", "name"))
     lines = text.splitlines()
-    assert lines[0] == "### Kicker: name"
+    assert lines[0] == "### A kicker: name"
     assert "❌ **Failed**: it failed." in text
     at = lines.index("    " + command)
     assert lines[at - 1] == lines[at + 1] == ""
@@ -219,6 +211,7 @@ def test_markdown_has_every_table_and_a_command_that_can_be_copied() -> None:
     assert after.count(r"| x\|y | 1 |") == 1
     assert after.rstrip().endswith("</details>")
     assert "| :-- | --: |" in before
+    assert "empty" not in text
 
 
 def test_a_result_shows_itself_in_a_notebook(result: Result) -> None:
