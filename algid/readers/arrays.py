@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from algid.base.arrow import column_of
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
-from algid.base.text import counted, repeated
+from algid.base.text import repeated
 from algid.notices import Notice
 from algid.readers.column_names import TIMES
 from algid.readers.flat import as_log_error
@@ -45,31 +45,27 @@ def open_arrays(path: Path, kind: str) -> TableFile:
     """
     readers = {"npz": ("NumPy", _of_npz), "mat": ("MATLAB", _of_mat), "hdf5": ("HDF5", _of_hdf5)}
     title, read = readers[kind]
-    _refuse_large(path)
+    _refuse_large(path, path.stat().st_size)
     with as_log_error(path, title):
         return of_arrays(str(path), kind, *read(path))
 
 
-def _refuse_large(path: Path) -> None:
-    if path.stat().st_size > LIMITS.whole_bytes:
+def _refuse_large(path: Path, size: int) -> None:
+    if size > LIMITS.whole_bytes:
         raise LogError(
-            f"{path}: a file of more than 1 GiB is not read as a whole; save it as Parquet"
+            f"{path}: what is more than 1 GiB, packed or not, is not read as a whole; save it as "
+            "Parquet"
         )
 
 
 def _of_npz(path: Path) -> Read:
     arrays: Arrays = {}
     with zipfile.ZipFile(path) as archive:
-        claimed = sum(entry.file_size for entry in archive.infolist())
+        _refuse_large(path, sum(entry.file_size for entry in archive.infolist()))
         twice = repeated(archive.namelist())
         if twice:
             raise LogError(
                 f"{path}: the array {twice[0]!r} stands in the archive twice; save it again"
-            )
-        if claimed > LIMITS.whole_bytes:
-            raise LogError(
-                f"{path}: the archive claims {counted(claimed, 'byte')} unpacked; save it as "
-                "Parquet"
             )
         for name in archive.namelist():
             with archive.open(name) as stream:
@@ -121,8 +117,7 @@ def _of_hdf5(path: Path) -> Read:
         kinds = {kind.kind for kind, *_ in (one.dtype.fields or {"": (one.dtype,)}).values()}
         if name.startswith("#") or not kinds <= set("iufbSO"):
             return
-        if one.nbytes > LIMITS.whole_bytes:
-            raise LogError(f"{path}: the array {name!r} is of more than 1 GiB; save it as Parquet")
+        _refuse_large(path, one.nbytes)
         # HDF5 fills up with zeros what was never written; texts lie apart
         stored, expected, unit = one.id.get_storage_size(), one.nbytes, "bytes"
         if one.chunks is not None:
@@ -273,7 +268,7 @@ def open_json_lines(path: Path) -> TableFile:
     """
     import polars as pl
 
-    _refuse_large(path)
+    _refuse_large(path, path.stat().st_size)
     text = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
     notices: tuple[Notice, ...] = ()
     whole = text.rfind(b"\n") + 1

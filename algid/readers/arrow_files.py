@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from algid.base.errors import LogError
 from algid.log import CANONICAL_COLUMNS, KEY, Companion, loads
 from algid.notices import Notice
 from algid.readers.flat import as_log_error
@@ -31,15 +30,9 @@ def open_parquet(path: Path) -> TableFile:
         schema = about.schema.to_arrow_schema()
         names = set(schema.names)  # damaged ones are no text
         text = (about.metadata or {}).get(KEY.encode())
-    companion = Companion(None, {})
+    with as_log_error(path, "truth in the Parquet"):
+        companion = Companion(None, {}) if text is None else loads(text)
     notices: tuple[Notice, ...] = ()
-    if text is not None:
-        try:
-            companion = loads(text)
-        except ValueError as error:
-            raise LogError(
-                f"{path}: the truth in the file's metadata cannot be read ({error})"
-            ) from error
     if not companion.sums and {"stamp_ns", *CANONICAL_COLUMNS} <= names:
         notices = (Notice("NO_CHECKSUM", numbers={"case": "values"}),)
 

@@ -139,11 +139,7 @@ def channel_readings(
                 f"{path}: the column {mapping[name]!r} for {like} is in {unit!r}; expected one of "
                 f"{', '.join(known)}; {right}"
             )
-        if file not in known and like not in REFERENCES:
-            notices.append(
-                Notice("OTHER_UNIT", numbers={"case": "foreign", **numbers, "given": unit})
-            )
-        elif file not in (unit, *(CURRENT if unit in TORQUE else ())) and source != "names":
+        if file != unit and source != "names":
             taken = {"taken": unit, "why": "as configured"}
             notices.append(Notice("OTHER_UNIT", numbers={"case": "stated", **numbers, **taken}))
         factor = channel.sign * profile.signs[joint] * _factor(path, like, channel, unit)

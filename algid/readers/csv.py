@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from functools import partial
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,10 +14,10 @@ from algid.base.files import read_whole
 from algid.log import Companion, loads
 from algid.notices import Notice
 from algid.readers.dialect import Dialect, detect, head_of, pieces
+from algid.readers.flat import as_log_error
 from algid.readers.table_cells import TableFile
 
 if TYPE_CHECKING:
-    import polars as pl
     import pyarrow as pa
 
 _EXCESS, _SPLIT = "excess", "split"
@@ -47,13 +48,9 @@ def open_csv(path: Path, kind: str, names: Sequence[str] | None = None) -> Table
     head = head_of(path, kind)
     dialect = detect(path, head, names)
     beside, companion = sidecar(path), Companion(None, {})
-    try:
-        if beside.is_file():
+    if beside.is_file():
+        with as_log_error(beside, "truth", "remove it"):
             companion = loads(read_whole(beside))
-    except (OSError, ValueError) as error:
-        raise LogError(
-            f"{beside}: the truth beside the log cannot be read ({error}); remove it"
-        ) from error
     # rows to expect of plain text: from the length of its first lines, and a tenth more
     expected, whole = 0, False
     source: Path | bytes = path
@@ -79,16 +76,12 @@ def open_csv(path: Path, kind: str, names: Sequence[str] | None = None) -> Table
                     while pair in source:
                         source = source.replace(pair, edge)
 
-    def batches(columns: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
-        for frame in _frames(path, source, dialect, columns, most, quoted=quoted):
-            yield from frame.to_batches()
-
     return TableFile(
         str(path),
         "csv",
         dialect.schema,
         0,
-        batches,
+        partial(_batches, path, source, dialect, quoted),
         companion,
         notices,
         expected=expected,
@@ -96,27 +89,58 @@ def open_csv(path: Path, kind: str, names: Sequence[str] | None = None) -> Table
     )
 
 
-def _frames(
+def _batches(
     path: Path,
     source: Path | bytes,
     dialect: Dialect,
+    quoted: bool,
     columns: Sequence[str],
     most: int | None,
-    *,
-    quoted: bool,
-) -> Iterator[pa.Table]:
+) -> Iterator[pa.RecordBatch]:
     """The columns' numbers; empty lines are no rows."""
     import polars as pl
     import pyarrow as pa
     import pyarrow.compute as pc
 
-    names, done = dialect.schema.names, 0
+    schema: dict[str, type[pl.DataType]] = {}
+    taken = {}
+    for place, column in enumerate(dialect.schema, start=1):
+        own = f"{place}: {column.name}"  # several may have no name
+        schema[own] = pl.String
+        if column.name in columns:
+            taken[column.name] = pl.col(own).alias(column.name)
+            if pa.types.is_floating(column.type) or pa.types.is_integer(column.type):
+                exact = column.name == columns[0] and pa.types.is_integer(column.type)
+                schema[own] = pl.Int64 if exact else pl.Float64
+    # polars drops cells past the last column without a word: one more column catches them
+    schema[_EXCESS] = pl.String
+    split = pl.lit(value=False)
+    if quoted:
+        # a cell that holds the cells of another row has taken in that row
+        line = rf"\n([^\n]*{re.escape(dialect.separator)}){{{len(dialect.schema) - 1}}}"
+        texts = [name for name, kind in schema.items() if kind is pl.String]
+        split = pl.any_horizontal(pl.col(*texts).str.contains(line)).fill_null(value=False)
+    done = 0
     empty: int | None = None
     try:
-        scan = _scan(source, dialect, columns, most, quoted=quoted)
+        scan = pl.scan_csv(
+            source,
+            has_header=False,
+            separator=dialect.separator or "\t",
+            decimal_comma=dialect.decimal_comma,
+            comment_prefix=dialect.comment,
+            skip_lines=dialect.skip,
+            quote_char='"' if quoted else None,
+            n_rows=most,
+            schema=schema,
+            missing_columns="insert",
+            glob=False,
+        ).select(
+            *(taken[name] for name in columns), pl.col(_EXCESS).is_not_null(), split.alias(_SPLIT)
+        )
         for frame in scan.collect_batches(chunk_size=_FRAME_ROWS):
             for name, wrong in (
-                (_EXCESS, f"has more cells than the header's {len(names)}"),
+                (_EXCESS, f"has more cells than the header's {len(dialect.schema)}"),
                 (_SPLIT, "goes on behind its line, for its quotes stay open"),
             ):
                 # in place: `drop` would queue behind the parsing of the next rows
@@ -133,32 +157,20 @@ def _frames(
                 frame = pl.concat([frame.clear(lost - lines), frame.filter(valued)])
             table = frame.to_arrow()
             for place, name in enumerate(columns):
-                kind = dialect.schema.field(names.index(name)).type
+                kind = dialect.schema.field(name).type
                 if pa.types.is_timestamp(kind):
                     texts = pc.utf8_trim_whitespace(table.column(place).cast(pa.string()))
                     dates = texts.cast(kind)
                     table = table.set_column(place, name, dates)
-            yield table
+            yield from table.to_batches()
     except pa.ArrowInvalid as error:
         raise LogError(
             f"{path}: past row {done - frame.height}: {error}; expected dates of 1678 to 2261"
         ) from error
     except pl.exceptions.PolarsError as error:
         reason = str(error).partition("\n")[0][:200]
-        wrong_cell = re.search(
-            r"could not parse `(.*?)` as dtype `(\w+)` at column '(\d+)'", str(error), re.DOTALL
-        )
-        if wrong_cell is None:
-            raise LogError(f"{path}: the table cannot be read past row {done}: {reason}") from error
-        cell, wanted, number = wrong_cell.groups()
-        if wanted == "str":
-            raise LogError(
-                f"{path}: past row {done}: quotes stay open; close them, or save the table "
-                "without quotes"
-            ) from error
         raise LogError(
-            f"{path}: column {names[int(number)]!r}, past row {done}: expected a number, "
-            f"found {cell[:40]!r}; mend the file or name another column"
+            f"{path}: past row {done}: {reason}; mend that row, quotes too, or name other columns"
         ) from error
 
 
@@ -167,50 +179,3 @@ def _empty_lines(source: Path | bytes, dialect: Dialect) -> int:
     text = source if isinstance(source, bytes) else source.read_bytes()
     blanks = rb"[ \r]" if dialect.separator == "\t" else rb"[ \t\r]"
     return len(re.findall(rb"(?m)^" + blanks + rb"*\n", text.split(b"\n", dialect.skip)[-1]))
-
-
-def _scan(
-    source: Path | bytes,
-    dialect: Dialect,
-    columns: Sequence[str],
-    most: int | None,
-    *,
-    quoted: bool,
-) -> pl.LazyFrame:
-    """The columns' numbers; whether a row has more cells than the header, or goes on behind it."""
-    import polars as pl
-    import pyarrow as pa
-
-    schema: dict[str, type[pl.DataType]] = {}
-    taken = {}
-    for place, column in enumerate(dialect.schema):
-        schema[str(place)] = pl.String
-        if column.name in columns:
-            taken[column.name] = pl.col(str(place)).alias(column.name)
-            if pa.types.is_floating(column.type) or pa.types.is_integer(column.type):
-                exact = column.name == columns[0] and pa.types.is_integer(column.type)
-                schema[str(place)] = pl.Int64 if exact else pl.Float64
-    # polars drops cells past the last column without a word: one more column catches them
-    schema[_EXCESS] = pl.String
-    frame = pl.scan_csv(
-        source,
-        has_header=False,
-        separator=dialect.separator or "\t",
-        decimal_comma=dialect.decimal_comma,
-        comment_prefix=dialect.comment,
-        skip_lines=dialect.skip,
-        quote_char='"' if quoted else None,
-        n_rows=most,
-        schema=schema,
-        missing_columns="insert",
-        glob=False,
-    )
-    split = pl.lit(value=False)
-    if quoted:
-        # a cell that holds the cells of another row has taken in that row
-        row = rf"\n([^\n]*{re.escape(dialect.separator)}){{{len(dialect.schema) - 1}}}"
-        texts = [name for name, kind in schema.items() if kind is pl.String]
-        split = pl.any_horizontal(pl.col(*texts).str.contains(row)).fill_null(value=False)
-    return frame.select(
-        *(taken[name] for name in columns), pl.col(_EXCESS).is_not_null(), split.alias(_SPLIT)
-    )

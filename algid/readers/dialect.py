@@ -142,8 +142,11 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
     above = [line.removeprefix(comment or "").strip() for line in lines[:number]]
     if all(_is_number(cell) for cell in columns if cell):
         skip, rows = 0, [header, *rows]
-        if names is None:
-            columns = _commented_header(above, columns, separator)
+        if names is None:  # the header may be one of the comments above
+            numbered = [f"column {place}" for place in range(1, len(columns) + 1)]
+            texts = (split(text, separator) for text in reversed(above))
+            fitting = (one for one in texts if len(one) == len(columns))
+            columns = next((one for one in fitting if not any(map(_is_number, one))), numbered)
         elif len(names) == len(columns):
             columns = list(names)
         else:
@@ -262,12 +265,3 @@ def _separator(path: Path, header: str, rows: list[str]) -> str:
     raise LogError(
         f"{path}: {header[:60]!r} has one column; expected columns split by , ; | tab or blanks"
     )
-
-
-def _commented_header(above: list[str], cells: list[str], separator: str) -> list[str]:
-    """The header's cells among the comments `above` the table; numbered where there is none."""
-    for text in reversed(above):
-        names = split(text, separator)
-        if len(names) == len(cells) and not any(map(_is_number, names)):
-            return names
-    return [f"column {place}" for place in range(1, len(cells) + 1)]

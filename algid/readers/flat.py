@@ -21,7 +21,7 @@ from algid.base.arrow import whole_column
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.quantiles import median
-from algid.base.units import ANGLE, NANOSECONDS, TORQUE, unit_of
+from algid.base.units import ANGLE, NANOSECONDS, unit_of
 from algid.log import IntArray, Origin, Reading, add, word_sum
 from algid.notices import Notice, Remedy
 from algid.readers.column_names import (
@@ -289,9 +289,6 @@ def _doubts(offered: Offered, sources: Mapping[str, str], profile: Profile) -> I
         if name not in JOINT_CHANNELS:
             continue
         current = name.startswith("tau") and take_apart(column).stem in CURRENTS
-        if current and user in TORQUE:
-            numbers = {"case": "current", "column": column, "name": name, "given": user}
-            yield Notice("OTHER_UNIT", numbers=numbers)
         if offered.fields[column].topic or not on_motor_side(column):
             of_joints.append(name)
         elif not (current or "gear_ratio" in profile.channel(name).model_fields_set):

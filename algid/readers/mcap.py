@@ -27,12 +27,12 @@ from mcap.records import Channel, Chunk, Metadata, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC as MCAP
 from numpy.typing import NDArray
 
-from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.runtime import ahead
 from algid.base.text import counted
 from algid.log import KEY, IntArray, loads
 from algid.notices import Notice
+from algid.readers.flat import as_log_error
 from algid.readers.messages.message_file import (
     MessageChannel,
     MessageFile,
@@ -75,18 +75,15 @@ def open_mcap(path: Path) -> MessageLog:
 
 @dataclass
 class _Part:
-    """Where a chunk's content lies in the file, or records outside of chunks (`loose`).
+    """Where records lie: a chunk with the message indexes behind it, or `loose` ones.
 
-    `counts` are its messages by channel, as the `index_length` bytes of indexes behind it tell;
-    None where nobody knows.
+    `counts` are its messages by channel, as the indexes tell; None where nobody knows.
     """
 
     start: int
     length: int
-    index_length: int = 0
+    loose: bool
     counts: dict[int, int] | None = None
-    loose: bool = False
-    torn: bool = False
 
 
 @dataclass
@@ -160,12 +157,8 @@ def mcap_file(path: Path) -> MessageFile:
             found.damage[:0] = [f"its summary: {why}"] if why else []
             found.look(stream, loose=False)
     metadata = records.get((Opcode.METADATA, KEY))
-    try:
+    with as_log_error(path, "truth in the MCAP"):
         truth = loads(metadata.metadata.get(KEY, "")).truth if metadata else None
-    except ValueError as error:
-        raise LogError(
-            f"{path}: the truth in the file's metadata cannot be read ({error})"
-        ) from error
     channels = {}
     for (code, number), one in records.items():
         if code == Opcode.CHANNEL:
@@ -200,20 +193,18 @@ def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
         known &= code != Opcode.MESSAGE or length >= _HEAD_BYTES - 9
         if not known or end > size:
             break
-        last = found.parts[-1] if found.parts else _Part(0, 0)
-        follows = last.start + last.length + last.index_length == place
-        if code == Opcode.CHUNK:
-            found.parts.append(_Part(place + _FRAME.size, length))
-        elif code == Opcode.MESSAGE_INDEX and follows and not last.loose:
-            last.index_length += end - place
+        last = found.parts[-1] if found.parts else _Part(0, 0, loose=False)
+        follows, loose = last.start + last.length == place, code != Opcode.CHUNK
+        if code == Opcode.MESSAGE_INDEX and follows and not last.loose:
+            last.length += end - place
             if 0 < entries == length - 6:
                 last.counts = {} if last.counts is None else last.counts
                 last.counts[channel] = entries // 16
-        elif code == Opcode.MESSAGE or (code in _KINDS and not data_end):
-            if follows and last.loose and last.length < _LOOSE_BYTES:
+        elif code in (Opcode.CHUNK, Opcode.MESSAGE) or (code in _KINDS and not data_end):
+            if loose and follows and last.loose and last.length < _LOOSE_BYTES:
                 last.length += end - place
             else:
-                found.parts.append(_Part(place, end - place, loose=True))
+                found.parts.append(_Part(place, end - place, loose))
         elif code == Opcode.DATA_END:
             data_end = end
         place = end
@@ -233,7 +224,7 @@ def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
     if left:
         found.damage.append(f"it breaks off at byte {place}")
         if known and code == Opcode.CHUNK:
-            found.parts.append(_Part(place + _FRAME.size, left - _FRAME.size, torn=True))
+            found.parts.append(_Part(place, left, loose=False))
 
 
 def _summary(stream: IO[bytes], size: int) -> Definitions:
@@ -262,28 +253,28 @@ def _records(stream: IO[bytes], part: _Part) -> tuple[Messages, NDArray[np.uint1
     ValueError
         If it is damaged; the libraries raise more.
     """
-    content, checked = _read(stream, part.start, part.length), False
+    content, checked, torn = _read(stream, part.start, part.length), False, False
     listed: Listed | None = None
     if not part.loose:
-        chunk = _parsed(Chunk, content)
-        content, size = _unpacked(chunk), chunk.uncompressed_size
-        checked = chunk.uncompressed_crc != 0
-        whole = len(content) == size
-        if not (whole or part.torn) or (
-            whole and checked and zlib.crc32(content) != chunk.uncompressed_crc
-        ):
+        end = _FRAME.size + _FRAME.unpack_from(content)[1]
+        torn, index = end > len(content), content[end:]
+        chunk = _parsed(Chunk, content[_FRAME.size : end])
+        content, checked = _unpacked(chunk), chunk.uncompressed_crc != 0
+        wrong = not torn
+        if len(content) == chunk.uncompressed_size:
+            wrong = checked and zlib.crc32(content) != chunk.uncompressed_crc
+        if wrong:
             raise ValueError("a chunk's size or its checksum is wrong")
-        listed = _by_index(content, _read(stream, part.start + part.length, part.index_length))
+        listed = _by_index(content, index)
     octets: NDArray[np.uint8] = np.frombuffer(content, np.uint8)
     offsets, others, end = listed or _one_by_one(content, 0, len(content))
-    if end != len(content) and not part.torn:
+    if end != len(content) and not torn:
         raise ValueError("its records do not fill it")
     heads = gather(octets, offsets, f"V{_HEAD.itemsize}").view(_HEAD)
     sizes = heads["length"].astype(np.int64) - (_HEAD_BYTES - 9)
     log_ns = heads["log_ns"].astype(np.int64)
     # nothing vouches for what is there of a torn chunk, which CUT_OFF says
-    checked |= part.torn
-    messages = Messages(octets[:end], offsets + _HEAD_BYTES, sizes, log_ns, checked)
+    messages = Messages(octets[:end], offsets + _HEAD_BYTES, sizes, log_ns, checked or torn)
     return messages, heads["channel"], others
 
 

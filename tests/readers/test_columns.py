@@ -155,8 +155,10 @@ def test_currents_are_in_amperes_unless_their_unit_is_told() -> None:
     assert units(current_2="mA") == ["A", "mA"]
     assert units(current_2="Nm") == ["A", "A"]
     told = assigned(header, {"tau1": {"unit": "N m"}, "tau2": CONSTANTS["tau2"]})
-    text = "'current_1' for tau1 is a current by its name, and is taken for a torque in N m as"
-    assert said(told) == [("OTHER_UNIT", f"{text} configured")]
+    text = (
+        "the file states the unit A for tau1 ('current_1'), which is taken for N m, as configured"
+    )
+    assert said(told) == [("OTHER_UNIT", text)]
 
 
 def test_the_file_and_the_user_differ_about_a_unit() -> None:
@@ -207,7 +209,7 @@ def test_a_unit_of_no_joint_is_refused_where_it_counts() -> None:
     (foreign,) = said(assigned("t q1_inch q2 tau1 tau2", {"theta1": {"unit": "rev"}}))
     assert (
         foreign[1]
-        == "the column 'q1_inch' for theta1 states the unit 'inch', and is taken for rev as "
+        == "the file states the unit inch for theta1 ('q1_inch'), which is taken for rev, as "
         "configured"
     )
     assert said(assigned("t q1_inch q2 q_b tau1 tau2", {"theta1": {"source": "q_b"}})) == []

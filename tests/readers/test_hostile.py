@@ -138,7 +138,7 @@ def test_a_truth_that_is_no_number_is_refused(number: float, tmp_path: Path) -> 
         {**content, "crc32": zlib.crc32(json.dumps(content, sort_keys=True).encode())}
     )
     pq.write_table(arm_table().replace_schema_metadata({"algid": text}), tmp_path / "log.parquet")
-    with pytest.raises(LogError, match="truth in the file's metadata cannot be read"):
+    with pytest.raises(LogError, match=r"truth in the .* file is damaged"):
         read_log(tmp_path / "log.parquet")
 
 

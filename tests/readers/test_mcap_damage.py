@@ -321,7 +321,7 @@ def test_a_file_of_which_damage_left_nothing_says_so_and_where(tmp_path: Path) -
     content[content.index(struct.pack("<d", LOG.theta[0, 50]))] ^= 1
     path.write_bytes(content)
     place = chunk.chunk_start_offset
-    with pytest.raises(LogError, match=rf"damaged \(.*checksum.*byte {place + 9}\).*no topic"):
+    with pytest.raises(LogError, match=rf"damaged \(.*checksum.*byte {place}\).*no topic"):
         read_log(path)
     content[content.rindex(b"JointState")] ^= 1  # in the summary
     path.write_bytes(content)
@@ -344,7 +344,8 @@ def test_the_truth_in_the_metadata_is_read_where_it_can_be(tmp_path: Path) -> No
     assert (same(found, LOG), found.origin.truth) == (True, None)
     path.write_bytes(content.replace(b'"arm"', b'"mra"'))
     with pytest.raises(
-        LogError, match=rf"^{path}: the truth in the file's metadata cannot be read \(.+\)$"
+        LogError,
+        match=rf"^{path}: the truth in the MCAP file is damaged .*ValueError.*; copy it again$",
     ):
         read_log(path)
 

@@ -63,7 +63,5 @@ def test_nul_bytes_among_the_rows_are_refused(rows: int, tmp_path: Path) -> None
     place = len(whole) // 2
     path = tmp_path / "log.csv"
     path.write_bytes(whole[:place] + bytes(500) + whole[place + 500 :])
-    with pytest.raises(
-        LogError, match=r"line 2 has .*mend|column .* expected a number, found .*mend"
-    ):
+    with pytest.raises(LogError, match=r"line 2 has .*mend|could not parse .*; mend that row"):
         read_log(path)

@@ -75,7 +75,10 @@ def test_logs_without_joints_are_refused(name: str, shared_data: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (CSV + "0,1,2,3,4\n0.1,1,x,3,4\n0.2,1,2,3,4\n", "'theta2'.*expected a number, found 'x'"),
+        (
+            CSV + "0,1,2,3,4\n0.1,1,x,3,4\n0.2,1,2,3,4\n",
+            "could not parse `x` .* column '3: theta2'",
+        ),
         (CSV + "0,1,2,3,4\n0.1,1,2,3,4,5\n0.2,1,2,3,4\n", "row 2 has more cells"),
         ("t,theta1,theta1,tau1,tau2\n0,1,2,3,4\n", "twice"),
     ],

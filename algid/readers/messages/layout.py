@@ -107,10 +107,6 @@ class MessageLayout:
         return [path for path in wanted.values() if self.find(path) is None]
 
 
-def _as_they_are(messages: Messages) -> Messages:
-    return messages
-
-
 @dataclass(frozen=True)
 class Codec:
     """How a channel's messages are read: as what `records`, of which `parse` gives the layout.
@@ -119,7 +115,7 @@ class Codec:
     """
 
     parse: Callable[[bytes], MessageLayout]
-    records: Callable[[Messages], Messages] = _as_they_are
+    records: Callable[[Messages], Messages] = lambda messages: messages
 
 
 Columns = dict[str, NDArray[np.generic]]
