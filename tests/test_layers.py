@@ -122,7 +122,7 @@ def sources() -> dict[str, str]:
         parts = ("algid", *path.relative_to(ROOT).with_suffix("").parts)
         name = ".".join(parts).removesuffix(".__init__").replace("algid.base.", "algid.")
         text = path.read_text(encoding="utf-8")
-        found[name] = text.replace("algid.base.", "algid.").replace("algid.base", "algid ")
+        found[name] = text.replace("algid.base.", "algid.").replace("algid.base ", "algid ")
     del found["algid.base"]
     return found
 
