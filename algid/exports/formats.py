@@ -140,20 +140,12 @@ def _program(arm: Description) -> dict[str, Any]:
     for term in terms:
         constants |= {shape.upper(): getattr(model, shape) for shape in term.shapes}
     content: dict[str, Any] = {"lacking": lacking, "constants": constants, "atoms": {}}
-    for name, held in {
-        "gravity": g,
-        "inertia": (*M, *X),
-        "load": M,
-        "rest": n,
-        "friction": r,
-    }.items():
+    for name, held in {"M": M, "n": n, "r": r, "g": g, "X": X, "MX": (*M, *X)}.items():
         atoms = {atom for weighted in held for product in weighted for atom in product}
         content["atoms"][name] = [
             f"{one.name} = {one.source}" for one in sorted(atoms) if one.source
         ]
-    for name, held in {"M": M, "n": n, "r": r, "g": g}.items():
         content[name] = [_source(model, weighted) or "0.0" for weighted in held]
-    content["X"] = [_source(model, weighted) for weighted in X]
     for kind in ("gains", "by_load"):
         names = attributes(model, kind)
         content[kind] = [[one.upper() for one, of in names if of == joint] for joint in (0, 1)]

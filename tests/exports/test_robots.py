@@ -16,25 +16,15 @@ from algid.exports.formats import SUFFIXES, exported
 from algid.model import Model
 from algid.results import Status
 from tests.exports.arms import ODD, result_of, states, values_of
+from tests.exports.test_peers import text_of
 
 XML = ("urdf", "sdf", "mjcf")
 
 
-def text_of(
-    to: str, value: dict[str, float] | None = None, model: Model | None = None, **known: float
-) -> str:
-    return exported(
-        result_of(values_of(ODD) if value is None else value, model),
-        "arm.algid",
-        to,
-        known,
-    )[0]
-
-
 def test_the_tip_is_where_the_angles_say() -> None:
     pin, mujoco = pytest.importorskip("pinocchio"), pytest.importorskip("mujoco")
-    robot = pin.buildModelFromXML(text_of("urdf", l2=0.35))
-    model = mujoco.MjModel.from_xml_string(text_of("mjcf", l2=0.35))
+    robot = pin.buildModelFromXML(text_of("urdf", values_of(ODD), l2=0.35))
+    model = mujoco.MjModel.from_xml_string(text_of("mjcf", values_of(ODD), l2=0.35))
     data, moved = mujoco.MjData(model), robot.createData()
     for theta in states(5)[0].T:
         angles = np.array([theta[0], theta.sum()])

@@ -1,5 +1,5 @@
-"""Windows, drift, outliers and labels by hand: weighted least squares, scipy's distributions, each
-limit.
+"""What is found of a fleet: by hand with weighted least squares and scipy's distributions at each
+limit, and on simulated fleets, where drift is found and nothing else is.
 """
 
 from __future__ import annotations
@@ -18,11 +18,21 @@ from scipy import stats
 
 from algid.base.errors import ResultError
 from algid.base.significance import CERTAIN
-from algid.fleet.history import history_of, read_jobs
+from algid.base.text import significant
+from algid.fleet.history import History, history_of
+from algid.fleet.page import finding_table, overview, robot_table, verdict
+from tests.report.pages import named
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 MONTH = 30.4375  # days
 STAMP = pl.Datetime("us", "UTC")
+NAMES = tuple(f"k{n}" for n in range(1, 8))
+
+
+def history_in(folder: Path, jobs: pl.DataFrame) -> History:
+    """The history of these jobs."""
+    jobs.write_parquet(folder / "jobs.parquet")
+    return history_of(folder / "jobs.parquet")
 
 
 def table(
@@ -42,23 +52,6 @@ def table(
         "k1_std": pl.Series([std] * count if isinstance(std, float) else std, dtype=pl.Float64),
     }
     return pl.DataFrame(columns | others)
-
-
-def read(jobs: pl.DataFrame, folder: Path) -> pl.DataFrame:
-    jobs.write_parquet(folder / "jobs.parquet")
-    return read_jobs(folder / "jobs.parquet")
-
-
-def followed(jobs: pl.DataFrame, folder: Path) -> pl.DataFrame:
-    """k1's windows."""
-    jobs.write_parquet(folder / "jobs.parquet")
-    return history_of(folder / "jobs.parquet").windows.filter(parameter="k1")
-
-
-def standing_out(jobs: pl.DataFrame, folder: Path, kind: str) -> pl.DataFrame:
-    """What is found of one kind."""
-    jobs.write_parquet(folder / "jobs.parquet")
-    return history_of(folder / "jobs.parquet").findings.filter(kind=kind)
 
 
 def weighted_line(t: np.ndarray, y: np.ndarray, std: np.ndarray) -> dict[str, float]:
@@ -96,7 +89,9 @@ def test_every_window_is_weighted_least_squares_with_students_test(
     std = draw.uniform(0.005, 0.02, days.size)
     values = 3 + growth * days / MONTH + scatter * std * draw.standard_normal(days.size)
     when = pl.Series([START + timedelta(days=int(day)) for day in days], dtype=STAMP)
-    found = followed(table(values.tolist(), std.tolist(), time=when), tmp_path)
+    found = history_in(tmp_path, table(values.tolist(), std.tolist(), time=when)).windows.filter(
+        parameter="k1"
+    )
     month = np.floor(days / MONTH).astype(int)
     assert found["month"].to_list() == sorted(set(month.tolist()))
     for row in found.rows(named=True):
@@ -119,13 +114,15 @@ def test_estimates_without_an_error_bar_count_for_nothing(tmp_path: Path) -> Non
         k1_std=pl.when(pl.col("job") == "j10").then(None).otherwise(pl.col("k1_std"))
     )
     for one in (jobs.head(10), nothing):
-        found = followed(one, tmp_path).rows(named=True)[-1]
+        found = history_in(tmp_path, one).windows.filter(parameter="k1").rows(named=True)[-1]
         assert found["logs"] == 8
         assert found["mean"] == pytest.approx(np.mean(good), rel=1e-12)
 
 
 def test_what_is_not_finished_is_not_read(tmp_path: Path) -> None:
-    found = read(table([1.0, 2.0, 3.0], status=["ok", "failed", "incomplete"]), tmp_path)
+    found = history_in(
+        tmp_path, table([1.0, 2.0, 3.0], status=["ok", "failed", "incomplete"])
+    ).jobs.reverse()
     assert found["job"].to_list() == ["j0", "j2"]
     assert found["month"].to_list() == [0, 0]
     assert found["t"].to_numpy() == pytest.approx([0, 2 / MONTH], rel=1e-12)
@@ -138,8 +135,7 @@ def test_numbers_beyond_all_bounds_are_no_estimates(
 ) -> None:
     jobs = table([1.0] * 12, m_p=[0.5] * 12, m_p_std=[0.1] * 12, label_payload=[0.5] * 12)
     changed = pl.when(pl.col("job") == "j3").then(pl.lit(value)).otherwise(column).alias(column)
-    jobs.with_columns(changed).write_parquet(tmp_path / "jobs.parquet")
-    history = history_of(tmp_path / "jobs.parquet")
+    history = history_in(tmp_path, jobs.with_columns(changed))
     assert history.jobs.filter(job="j3")[column].to_list() == [None]
     assert not history.findings.filter(kind="step").height
     json.loads(history.as_json())
@@ -148,7 +144,9 @@ def test_numbers_beyond_all_bounds_are_no_estimates(
 @pytest.mark.parametrize(("away", "told"), [(5.99, False), (6.01, True), (-6.01, True)])
 def test_an_outlier_is_six_deviations_away(away: float, told: bool, tmp_path: Path) -> None:
     """Where half the logs are the median itself the scatter is the intervals' own, never less."""
-    found = standing_out(table([1.0] * 7 + [1.0 + 0.01 * away]), tmp_path, "outlier")
+    found = history_in(tmp_path, table([1.0] * 7 + [1.0 + 0.01 * away])).findings.filter(
+        kind="outlier"
+    )
     assert found.height == told
     if told:
         expected = ("outlier", "r", "j7", "k1", 1.0 + 0.01 * away, 1.0)
@@ -171,7 +169,7 @@ def test_logs_that_scatter_are_judged_by_their_scatter(
     values = [1 + 0.01 * one for one in (-3, 3, -3, 3, 0, -3, 3, -3, 3, away * robust)]
     jobs = table([*values, 1.0])
     assert jobs["k1"].median() == pytest.approx(1.0, abs=1e-12)
-    found = standing_out(jobs, tmp_path, "outlier")
+    found = history_in(tmp_path, jobs).findings.filter(kind="outlier")
     assert found["job"].to_list() == (["j9"] if told else [])
 
 
@@ -180,7 +178,7 @@ def test_a_label_is_wrong_once_in_a_million(payload: float, told: bool, tmp_path
     jobs = table(
         [1.0] * 5, m_p=[0.5, 0.5, payload, 0.5, 0.5], m_p_std=[0.001] * 5, label_payload=[0.5] * 5
     )
-    found = standing_out(jobs, tmp_path, "payload")
+    found = history_in(tmp_path, jobs).findings.filter(kind="payload")
     assert found["job"].to_list() == (["j2"] if told else [])
     if told:
         assert found.select("kind", "parameter", "value", "expected").row(0) == (
@@ -198,8 +196,7 @@ def test_drifts_are_the_latest_of_each_robot_and_the_clearest_comes_first(tmp_pa
     clear = [1 + 0.0009 * day for day in range(days)]
     jobs = pl.concat([table(faint), table(clear, robot=["s"] * days)])
     jobs = jobs.with_columns(k2=pl.lit(1.0), k2_std=pl.lit(0.01))
-    jobs.write_parquet(tmp_path / "jobs.parquet")
-    history = history_of(tmp_path / "jobs.parquet")
+    history = history_in(tmp_path, jobs)
     found = history.findings
     assert found.select("kind", "robot", "parameter").rows() == [
         ("drift", "s", "k1"),
@@ -265,8 +262,161 @@ def test_a_step_is_what_two_means_explain_once_in_a_million_lives(
     """Ten logs on either side: the gain is 5 (step / std)², at one of 19 places."""
     gain = stats.chi2.isf(CERTAIN / 19, 1)
     step = 0.01 * math.sqrt(share * gain / 5)
-    found = standing_out(table([1.0] * 10 + [1.0 + step] * 10), tmp_path, "step")
+    found = history_in(tmp_path, table([1.0] * 10 + [1.0 + step] * 10)).findings.filter(kind="step")
     assert found.height == told
     if told:
         assert found.select("job", "expected").row(0) == ("j10", pytest.approx(1.0))
         assert found["value"][0] == pytest.approx(step, rel=1e-9)
+
+
+def fleet(
+    robots: int, days: int, seed: int, growth: float = 0.0, scatter: float = 1.0
+) -> pl.DataFrame:
+    """One log a day: estimates of 1 ± 0.5 %, scattering `scatter` times as much as they say.
+
+    k6 grows a month.
+    """
+    rng = np.random.default_rng(seed)
+    rows = robots * days
+    day = np.tile(np.arange(days), robots)
+    robot = np.repeat(np.arange(robots), days)
+    columns: dict[str, object] = {
+        "job": [f"j{row}" for row in range(rows)],
+        "robot": [f"r{one}" for one in robot],
+        "time": pl.Series([START + timedelta(days=int(one)) for one in day], dtype=STAMP),
+        "status": ["ok"] * rows,
+    }
+    for name in NAMES:
+        trend = growth * day / MONTH if name == "k6" else 0.0
+        columns[name] = 1 + trend + scatter * 0.005 * rng.standard_normal(rows)
+        columns[f"{name}_std"] = np.full(rows, 0.005)
+    return pl.DataFrame(columns)
+
+
+def test_growth_of_a_percent_a_month_is_found_within_three_months(tmp_path: Path) -> None:
+    history = history_in(tmp_path, fleet(20, 92, seed=1, growth=0.01))
+    found = history.findings.filter(kind="drift", parameter="k6")
+    assert found["robot"].n_unique() == 20
+    assert found["value"].to_numpy() == pytest.approx(
+        0.01, abs=2.6 * float(found["half"].to_numpy().max())
+    )
+
+
+@pytest.mark.parametrize("scatter", [1.0, 3.0])
+def test_false_alarms_stay_below_one_a_robot_year(tmp_path: Path, scatter: float) -> None:
+    history = history_in(tmp_path, fleet(100, 365, seed=2, scatter=scatter))
+    # 100 robots a year, 0.084 expected each: Poisson(8.4) passes 25 with probability 1e-6.
+    assert history.windows["drift"].sum() <= 25
+
+
+def payloads(values: list[float], std: float = 0.001) -> pl.DataFrame:
+    jobs = fleet(1, len(values), seed=6)
+    return jobs.with_columns(m_p=pl.Series(values), m_p_std=pl.lit(std), label_payload=pl.lit(0.5))
+
+
+@pytest.mark.parametrize(
+    ("values", "wrong"),
+    [
+        ([0.9], ["j0"]),
+        ([0.5001, 0.9], ["j1"]),
+        ([0.9, 0.5001], ["j0"]),
+        ([0.1, 0.4999], ["j0"]),
+        ([0.5001, 0.9, 0.4995], ["j1"]),
+        ([0.5001, 0.9, 0.4995, 0.5005], ["j1"]),
+        ([0.9, 0.9002], ["j0", "j1"]),
+        ([0.504, 0.496], []),
+        ([0.5, 0.47, 0.53, 0.48, 0.52, 0.51], []),  # their own scatter is what they are judged by
+    ],
+)
+def test_a_wrong_label_is_found_however_few_the_logs(
+    values: list[float], wrong: list[str], tmp_path: Path
+) -> None:
+    findings = history_in(tmp_path, payloads(values)).findings
+    assert sorted(findings.filter(kind="payload")["job"]) == wrong
+
+
+def test_a_panic_of_the_library_is_a_refusal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A damaged bitmap ends in one, which is no Exception."""
+
+    def panics(*_: object, **__: object) -> None:
+        raise pl.exceptions.PanicException("assertion failed: offset + length <= self.length")
+
+    path = tmp_path / "jobs.parquet"
+    fleet(1, 3, seed=1).write_parquet(path)
+    monkeypatch.setattr(pl, "scan_parquet", panics)
+    with pytest.raises(ResultError, match=r"jobs\.parquet: cannot read it \(assertion failed"):
+        history_of(path)
+
+
+def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: Path) -> None:
+    jobs = fleet(2, 120, seed=20)
+    late = (pl.col("robot") == "r1") & (pl.col("time") >= START + timedelta(days=80))
+    replaced = jobs.with_columns(
+        pl.when(late).then(pl.col(name) * 1.05).otherwise(pl.col(name)).alias(name)
+        for name in ("k1", "k3")
+    )
+    history = history_in(tmp_path, replaced)
+    found = history.findings  # the steps would be drifts of every window that holds them
+    assert sorted(found.select("kind", "robot", "parameter").rows()) == [
+        ("step", "r1", "k1"),
+        ("step", "r1", "k3"),
+    ]
+    first = found.row(0, named=True)
+    assert (first["before"], first["time"]) == tuple(START + timedelta(days=d) for d in (79, 80))
+    assert first["job"] == "j200"
+    spread = 0.005 * np.sqrt(1 / 80 + 1 / 40)
+    assert found["value"].to_numpy() == pytest.approx(0.05, abs=5 * spread)
+    assert found["half"].to_numpy() == pytest.approx(stats.t.ppf(0.975, 118) * spread, rel=0.2)
+    assert [one.text for one in verdict(history).reasons] == [
+        "2 parameters changed at once: k1 of r1 and k3 of r1"
+    ]
+    (row,) = [row for row in finding_table(history, {}).rows if row[2] == "k1"]
+    step = found.filter(parameter="k1").row(0, named=True)
+    value, half = (
+        significant(100 * step[n] / step["expected"], 2 + (n == "value")) for n in ("value", "half")
+    )
+    assert row[1:5] == ("r1", "k1", "step", f"{value} ± {half} %")
+    assert row[6] == "2026-03-21 to 2026-03-22"
+    assert [row[3] for row in robot_table(history, {}).rows] == ["none", "2"]
+    assert verdict(history).headline == "2 robots, 240 logs: 2 steps"
+    plot = overview(history)
+    assert plot is not None
+    panels = [one["text"] for one in plot.layout["annotations"]]
+    assert panels == ["<b>r1: k1, kg m²</b>", "<b>r1: k3, kg m²</b>"]
+    lines = [one["x0"] for one in plot.layout["shapes"]]
+    assert lines == [pytest.approx((START + timedelta(days=80)).timestamp() * 1000)] * 2
+    assert {one["name"] for one in plot.data} == {"log", "mean"}
+    assert len(named(plot.data, "mean")) == 4  # no line leads across the change
+
+
+@pytest.mark.parametrize("scatter", [1.0, 3.0])
+def test_no_change_is_seen_where_there_is_none(tmp_path: Path, scatter: float) -> None:
+    """200 lives of 90 logs: a share of 1e-6 of false ones is none of them."""
+    history = history_in(tmp_path, fleet(200, 90, seed=21, scatter=scatter))
+    assert not history.findings.filter(kind="step").height
+
+
+def test_neither_a_drift_nor_a_wild_log_is_a_change(tmp_path: Path) -> None:
+    growing = history_in(tmp_path, fleet(20, 365, seed=22, growth=0.01))
+    assert not growing.findings.filter(kind="step").height
+    jobs = fleet(1, 365, seed=23)
+    k3 = jobs["k3"].to_numpy().copy()
+    k3[200] = 50.0
+    wild = history_in(tmp_path, jobs.with_columns(k3=pl.Series(k3)))
+    assert wild.findings.select("kind", "job").rows() == [("outlier", "j200")]
+
+
+def test_robots_of_a_log_each_may_be_sessions_of_one(tmp_path: Path) -> None:
+    one = history_in(tmp_path, fleet(1, 15, seed=24).with_columns(robot=pl.col("job")))
+    (alone,) = verdict(one).reasons
+    assert (alone.key, alone.numbers["count"]) == ("NOT_TESTED:steady", 15)
+
+
+def test_estimates_that_end_are_no_change(tmp_path: Path) -> None:
+    """Of their information nothing is left behind the last one, but for rounding."""
+    jobs = fleet(50, 40, seed=25)
+    day = pl.col("time").rank("dense").over("robot")
+    ended = jobs.with_columns(pl.when(day <= 17).then(pl.col("k1", "k1_std")))
+    assert not history_in(tmp_path, ended).findings.filter(kind="step").height
