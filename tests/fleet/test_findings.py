@@ -408,10 +408,21 @@ def test_neither_a_drift_nor_a_wild_log_is_a_change(tmp_path: Path) -> None:
     assert wild.findings.select("kind", "job").rows() == [("outlier", "j200")]
 
 
-def test_robots_of_a_log_each_may_be_sessions_of_one(tmp_path: Path) -> None:
-    one = history_in(tmp_path, fleet(1, 15, seed=24).with_columns(robot=pl.col("job")))
-    (alone,) = verdict(one).reasons
-    assert (alone.key, alone.numbers["count"]) == ("NOT_TESTED:steady", 15)
+def test_a_large_fleet_is_cut_and_what_was_not_tested_is_named(tmp_path: Path) -> None:
+    jobs = fleet(1, 203, seed=24).with_columns(
+        robot=pl.when(pl.col("job") != "j0").then("job"),
+        time=pl.when(pl.col("job") != "j1").then("time"),
+    )
+    history = history_in(tmp_path, jobs)
+    reasons = verdict(history).reasons
+    told = [("nameless", 1), ("undated", 1), ("steady", 202)]
+    assert [(one.case, one.numbers["count"]) for one in reasons] == told
+    assert json.loads(history.as_json())["untested"] == [one.text for one in reasons]
+    table, plot = robot_table(history, {}), overview(history)
+    assert (len(table.rows), table.note) == (200, "202 robots; the first 200 are shown.")
+    assert table.rows[0] == ("j1", "j1", "1", "not tested", "–", "–")
+    assert plot is not None
+    assert len(plot.layout["annotations"]) == 12
 
 
 def test_estimates_that_end_are_no_change(tmp_path: Path) -> None:
