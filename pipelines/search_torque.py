@@ -117,7 +117,7 @@ def shares(
         """x_r (6, B), or x_m (5, B) where k6 (B,) is known: medians over the `judged` instants."""
         theta = motions(constants, genes)
         terms = columns(theta, observed(theta, gain), tau, DT)
-        unknown, rhs = terms.first_joint(), terms.torque1
+        unknown, rhs = np.stack(terms[:6]), terms.torque1
         if known_k6 is not None:
             unknown, rhs = np.delete(unknown, 3, axis=0), rhs - known_k6[:, None] * terms.viscous1
         rows = stack_rows(np.concatenate([unknown, rhs[None]]), DT, len(unknown))[..., judged]

@@ -28,11 +28,10 @@ from algid.estimators.combine import (
 )
 from algid.estimators.identifiability import (
     Identifiability,
-    Whiteness,
     examine,
     open_directions,
 )
-from algid.estimators.innovations import ResidualSums
+from algid.estimators.innovations import ResidualSums, Whiteness
 from algid.estimators.parametrisation import Shared
 from algid.estimators.repeats import Groups, merged
 from algid.estimators.whitening import NoiseLevels

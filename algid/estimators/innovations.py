@@ -13,20 +13,30 @@ P       periodogram, 1 for white noise of unit variance    (s, n // 2)   u²
 f       frequency                                          (F,)          cycles a row
 r       autocorrelation                                    (2, L)        1
 ======  =================================================  ============  ==============
+
+The error bars of the likelihood suppose innovations that are white and Gaussian: Ljung & Box's
+test on those of each joint, as they are and summed over 16 and 64 samples, so that slow colour is
+seen as well as fast. The smallest p-value counts three times over (Bonferroni), and a correlation
+too faint to matter counts as none. The excess kurtosis shows heavy tails.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from algid.arm import FloatArray, keep_arrays
-from algid.base.compiled import chi2_exceeded
-from algid.base.significance import NORMAL
+from algid.base.compiled import chi2_exceeded, chi2_tail
+from algid.base.significance import NORMAL, level
 
 LAGS = 40
+SCALES = (1, 16, 64)
+_LAGS = 10
+_FAINT = 0.02  # root mean square of the correlations that does not matter
+_TAILS = 6.0  # standard errors of the kurtosis
+_HEAVY = 1.0  # excess kurtosis that matters
 ALIKE = 0.01  # relative difference of two periods that counts as none
 _BINS = 112
 _EDGES = np.geomspace(2.0**-14, 0.5, _BINS + 1)  # cycles a row
@@ -47,6 +57,8 @@ class ResidualSums:
     power : (s, bins), Σ P by bin
     lines, scatter : (bins,), lines in each bin, and their sum's variance for unit white noise
     products, pairs : (2, lags + 1) and (lags + 1,), Σ w_i w_(i+lag) and of how many pairs
+    counts, scaled, fourth : (3,), (3, 2, 1 + `_LAGS`) and (2,), rows summed over each of `SCALES`,
+        the products of those sums by lag, and Σ w⁴: see `judge`
     """
 
     dt: float
@@ -56,20 +68,18 @@ class ResidualSums:
     scatter: FloatArray
     products: FloatArray
     pairs: FloatArray
+    counts: FloatArray
+    scaled: FloatArray
+    fourth: FloatArray
 
     def __post_init__(self) -> None:
         keep_arrays(self)
 
     def __add__(self, other: ResidualSums) -> ResidualSums:
-        return ResidualSums(
-            self.dt,
-            self.stride,
-            self.power + other.power,
-            self.lines + other.lines,
-            self.scatter + other.scatter,
-            self.products + other.products,
-            self.pairs + other.pairs,
-        )
+        added = {
+            one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)
+        }
+        return ResidualSums(**added | {"dt": self.dt, "stride": self.stride})
 
 
 def residual_sums(w: FloatArray, dt: float, stride: int = 1, lags: int = LAGS) -> ResidualSums:
@@ -88,13 +98,31 @@ def residual_sums(w: FloatArray, dt: float, stride: int = 1, lags: int = LAGS) -
     near = _NEIGHBOURS[0] * np.maximum(lines - 1, 0.0)
     far = _NEIGHBOURS[1] * np.maximum(lines - 2, 0.0)
     scatter = lines + 2 * (near + far)
-    products = np.empty((2, lags + 1))
-    for lag in range(lags + 1):
-        overlap = max(n - lag, 0)
-        products[0, lag] = w[0, lag:] @ w[0, :overlap]
-        products[1, lag] = w[1, lag:] @ w[1, :overlap]
     pairs = np.maximum(n - np.arange(lags + 1, dtype=np.float64), 0.0)
-    return ResidualSums(dt, stride, power.astype(np.float64), lines, scatter, products, pairs)
+    counts, scaled = [], []
+    for scale in SCALES:
+        whole = n // scale
+        x = w[:2, : whole * scale].reshape(2, whole, scale).sum(axis=2) / np.sqrt(scale)
+        counts.append(float(whole))
+        scaled.append(_lag_products(x, _LAGS))
+    return ResidualSums(
+        dt,
+        stride,
+        power.astype(np.float64),
+        lines,
+        scatter,
+        _lag_products(w[:2], lags),
+        pairs,
+        np.array(counts),
+        np.array(scaled),
+        np.sum(w[:2] ** 4, axis=1),
+    )
+
+
+def _lag_products(x: FloatArray, lags: int) -> FloatArray:
+    """Sums (2, 1 + lags) of the products of rows of x (2, n) with themselves, so much later."""
+    n = x.shape[1]
+    return np.array([[row[lag:] @ row[: max(0, n - lag)] for lag in range(lags + 1)] for row in x])
 
 
 def pooled(sums: Sequence[ResidualSums]) -> ResidualSums | None:
@@ -179,3 +207,59 @@ def whiteness_of(sums: ResidualSums) -> Spectra:
     level = 2 * sums.dt * variance
     share = np.divide(raw.density[:2], level, out=np.zeros_like(raw.density[:2]), where=level > 0)
     return Spectra(raw.frequency, share, raw.low, raw.high)
+
+
+@dataclass(frozen=True, eq=False)
+class Whiteness:
+    """The test's outcome by joint (2,): p-value, lag-one correlation, excess kurtosis.
+
+    And the verdict.
+    """
+
+    p_value: FloatArray
+    lag1: FloatArray
+    kurtosis: FloatArray
+    joint_white: tuple[bool, bool]
+
+    def __post_init__(self) -> None:
+        keep_arrays(self)
+
+    @property
+    def white(self) -> bool:
+        """Whether both joints' innovations pass."""
+        return all(self.joint_white)
+
+
+def judge(sums: ResidualSums) -> Whiteness:
+    """Test innovations for whiteness.
+
+    Parameters
+    ----------
+    sums : ResidualSums
+
+    Returns
+    -------
+    Whiteness
+        A joint is white with a p-value of its share at least, and without heavy tails.
+
+    Notes
+    -----
+    Ljung & Box 1978: n (n + 2) Σ ρ_l² / (n − l) over the lags l is χ² with as many degrees of
+    freedom.
+    """
+    power = np.maximum(sums.scaled[:, :, :1], 1e-300)
+    rho = sums.scaled[:, :, 1:] / power
+    n = sums.counts[:, None, None]
+    lags = np.arange(1, _LAGS + 1)
+    tested = lags < n / 4
+    terms = n * (n + 2) * rho**2 / np.maximum(n - lags, 1)
+    statistic = np.sum(np.where(tested, terms, 0.0), axis=2)
+    p = chi2_tail(np.maximum(tested.sum(axis=2), 1), statistic)
+    # In a long log the least colour is significant; one this faint does not move an error bar.
+    faint = np.sqrt(np.mean(rho**2, axis=2)) < _FAINT
+    p_value = np.minimum(1.0, len(SCALES) * np.where(faint, 1.0, p).min(axis=0))
+    variance = power[0, :, 0] / sums.counts[0]
+    kurtosis = sums.fourth / sums.counts[0] / variance**2 - 3
+    heavy = (kurtosis > _HEAVY) & (kurtosis > _TAILS * np.sqrt(24 / sums.counts[0]))
+    first, second = ((p_value >= 0.5 * level("NOT_WHITE")) & ~heavy).tolist()
+    return Whiteness(p_value, rho[0, :, 0], kurtosis, (first, second))

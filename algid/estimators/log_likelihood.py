@@ -17,7 +17,6 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.base.quantiles import medians
 from algid.estimators.combine import BlockSums, LogInformation
-from algid.estimators.identifiability import Correlations, correlations
 from algid.estimators.innovations import ResidualSums, residual_sums
 from algid.estimators.noise import (
     Components,
@@ -69,16 +68,12 @@ class _Innovations:
     dt: float
 
     @cached_property
-    def correlations(self) -> Correlations:
-        return correlations(self.joints)
-
-    @cached_property
     def residual(self) -> ResidualSums:
         return residual_sums(self.joints, self.dt)
 
     def summed(self) -> _Innovations:
         """The sums alone, without what they are made of."""
-        _ = self.correlations, self.residual
+        _ = self.residual
         self.joints = np.empty((2, 0))
         return self
 
@@ -97,13 +92,8 @@ class Outcome:
     noise_change: float = 0.0
 
     @cached_property
-    def innovations(self) -> Correlations:
-        """Sums over the innovations."""
-        return reduce(add, [piece.correlations for piece in self.pieces])
-
-    @cached_property
     def residual(self) -> ResidualSums:
-        """Sums that the innovations' spectrum is made of."""
+        """Sums over the innovations."""
         return reduce(add, [piece.residual for piece in self.pieces])
 
 
@@ -176,15 +166,11 @@ class LogEvidence:
 
     @property
     def refuted(self) -> bool:
-        """True if the noise level so far is implausible: see `is_implausible`."""
-        return self.is_implausible(self.noise.tau)
+        """True if the noise level so far is implausible.
 
-    def is_implausible(self, tau: FloatArray) -> bool:
-        """True if errors (2,) of the torques in N m are no white noise of a sensor.
-
-        A sensor's is not far above what neighbouring samples differ by.
+        A sensor's white noise is not far above what neighbouring samples differ by.
         """
-        return bool(np.any(tau > np.maximum(_EXCESS * self._rough, self._least)))
+        return bool(np.any(self.noise.tau > np.maximum(_EXCESS * self._rough, self._least)))
 
     def exceeds_noise(self, tau: FloatArray, factor: float) -> bool:
         """True if errors (2,) of the torques in N m are `factor` times what neighbours differ by.

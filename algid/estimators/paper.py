@@ -28,6 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,13 +39,13 @@ from algid.signals.differences import integral
 from algid.signals.segments import Segment, pieces_of
 
 
-@dataclass(frozen=True, eq=False)
-class IntegralColumns:
+class IntegralColumns(NamedTuple):
     """What multiplies each unknown after t² and two integrations, each (..., n).
 
     And the torque's own integral.
 
-    `inertia1` and `inertia2` multiply θ̈1 and θ̈2, `viscous1` and `viscous2` θ̇1 and θ̇2.
+    `inertia1` and `inertia2` multiply θ̈1 and θ̈2, `viscous1` and `viscous2` θ̇1 and θ̇2. The first
+    six are the coefficients of x_r = [k5+k3, k1, k3, k6, k4, k2] in eq. (3), the next its torque.
     """
 
     inertia1: FloatArray
@@ -57,19 +58,6 @@ class IntegralColumns:
     coupling2: FloatArray
     viscous2: FloatArray
     torque2: FloatArray
-
-    def first_joint(self) -> FloatArray:
-        """The coefficients (6, ..., n) of x_r = [k5+k3, k1, k3, k6, k4, k2] in eq. (3)."""
-        return np.stack(
-            [
-                self.inertia1,
-                self.coupling1,
-                self.inertia2,
-                self.viscous1,
-                self.gravity1,
-                self.gravity12,
-            ]
-        )
 
 
 def columns(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> IntegralColumns:
@@ -228,7 +216,7 @@ def stage1(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> 
         NaN in the first ε of each window, and where a system is singular.
     """
     terms = columns(theta, omega, tau, dt)
-    solution = _solved_late(np.concatenate([terms.first_joint(), terms.torque1[None]]), dt)
+    solution = _solved_late(np.stack(terms[:7]), dt)
     k5_k3, k1, k3, k6, k4, k2 = solution.x
     known = k3 * (terms.inertia1 + terms.inertia2) + k1 * terms.coupling2 + k2 * terms.gravity12
     k7, k7_condition = _single_unknown(terms.viscous2, terms.torque2 - known)
@@ -276,11 +264,9 @@ def stage2(
         NaN in the first ε of each window, and where a system is singular.
     """
     terms = columns(theta, omega, tau, dt)
-    unknown = np.stack(
-        [terms.inertia1, terms.coupling1, terms.inertia2, terms.gravity1, terms.gravity12]
-    )
     rest = terms.torque1 - k[5] * terms.viscous1
-    solution = _solved_late(np.concatenate([unknown, rest[None]]), dt)
+    unknown = [terms.inertia1, terms.coupling1, terms.inertia2, terms.gravity1, terms.gravity12]
+    solution = _solved_late(np.stack([*unknown, rest]), dt)
     return np.stack([*solution.x, *payload(solution.x, k, gravity), solution.condition])
 
 

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2, kstest, kurtosis
 
-from algid.estimators.identifiability import correlations, judge
+from algid.arm import FloatArray
+from algid.estimators.innovations import ResidualSums, judge, residual_sums
+
+
+def summed(w: FloatArray) -> ResidualSums:
+    return residual_sums(w, 1.0)
 
 
 def _ljung_box(x: np.ndarray, lags: int = 10) -> float:
@@ -24,7 +29,7 @@ def test_the_p_value_is_that_of_the_least_likely_scale_three_times_over() -> Non
     w = np.stack(
         [np.convolve(rng.standard_normal(1301), [1.0, 0.1], "valid"), rng.standard_normal(1300)]
     )
-    found = judge(correlations(w))
+    found = judge(summed(w))
     for joint in range(2):
         by_scale = [
             w[joint],
@@ -47,8 +52,8 @@ def test_the_p_value_is_that_of_the_least_likely_scale_three_times_over() -> Non
 def test_sums_of_pieces_are_added() -> None:
     w = np.random.default_rng(4).standard_normal((2, 3000))
     whole, parts = (
-        judge(correlations(w)),
-        judge(correlations(w[:, :1600]) + correlations(w[:, 1600:])),
+        judge(summed(w)),
+        judge(summed(w[:, :1600]) + summed(w[:, 1600:])),
     )
     np.testing.assert_allclose(parts.kurtosis, whole.kurtosis, rtol=1e-12)
     np.testing.assert_allclose(parts.lag1, whole.lag1, atol=3 / 3000)  # one product in 3000 is lost
@@ -56,7 +61,7 @@ def test_sums_of_pieces_are_added() -> None:
 
 def test_white_innovations_pass_as_often_as_said_and_coloured_ones_do_not() -> None:
     rng = np.random.default_rng(5)
-    found = [judge(correlations(rng.standard_normal((2, 4000)))) for _ in range(400)]
+    found = [judge(summed(rng.standard_normal((2, 4000)))) for _ in range(400)]
     p = np.array([one.p_value for one in found]).ravel()
     # Bonferroni: the least of three p-values, times three, is below 0.05 once in 20.5 times at most
     assert np.sum(p < 0.05) <= binom.ppf(0.999, p.size, 0.05)
@@ -66,10 +71,10 @@ def test_white_innovations_pass_as_often_as_said_and_coloured_ones_do_not() -> N
     fast = np.stack(
         [np.convolve(rng.standard_normal(4001), [1.0, 0.15], "valid"), rng.standard_normal(4000)]
     )
-    assert judge(correlations(fast)).joint_white == (False, True)
+    assert judge(summed(fast)).joint_white == (False, True)
     slow = 0.15 * np.sin(np.arange(4000) / 60)
     assert judge(
-        correlations(np.stack([rng.standard_normal(4000), rng.standard_normal(4000) + slow]))
+        summed(np.stack([rng.standard_normal(4000), rng.standard_normal(4000) + slow]))
     ).joint_white == (
         True,
         False,
@@ -82,8 +87,8 @@ def test_colour_that_is_too_faint_to_matter_and_tails() -> None:
         [np.convolve(row, [1.0, 0.03], "valid") for row in rng.standard_normal((2, 60_001))]
     )
     assert float(chi2.sf(60_000 * 0.03**2, 10)) < 1e-6  # Ljung and Box alone would call it coloured
-    assert judge(correlations(faint)).white
+    assert judge(summed(faint)).white
     heavy = rng.standard_t(5, (2, 60_000))
-    assert judge(correlations(heavy)).joint_white == (False, False)
+    assert judge(summed(heavy)).joint_white == (False, False)
     light = rng.uniform(-1, 1, (2, 60_000))
-    assert judge(correlations(light)).white
+    assert judge(summed(light)).white

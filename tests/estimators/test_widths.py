@@ -10,7 +10,7 @@ import pytest
 from algid.arm import FloatArray
 from algid.estimators import refined
 from algid.estimators.problem import Problem, WeakSettings
-from algid.estimators.widths import likeliest_width
+from algid.estimators.refined import likeliest_width
 from algid.model import Model
 from algid.signals.segments import Segment
 from pipelines.accuracy_scenes import random_arm
