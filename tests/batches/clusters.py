@@ -27,17 +27,15 @@ class Dask:
             self.port = free.getsockname()[1]
         self.address = f"tcp://127.0.0.1:{self.port}"
 
-    def start(
-        self, kind: str, *flags: str, until: str, root: Path = ROOT
-    ) -> subprocess.Popen[bytes]:
+    def start(self, kind: str, *flags: str, until: str) -> subprocess.Popen[bytes]:
         """A scheduler or a worker, once it says that it is ready."""
         said = self.folder / f"{kind}{len(self.running)}.txt"
         code = f"from distributed.cli import dask_{kind}; dask_{kind}.main()"
-        env: dict[str, Any] = {**os.environ, "PYTHONPATH": str(root)}
+        env: dict[str, Any] = {**os.environ, "PYTHONPATH": str(ROOT)}
         with said.open("wb") as stream:
             command = [sys.executable, "-c", code, *flags, "--no-dashboard"]
             self.running.append(
-                subprocess.Popen(command, env=env, cwd=root, stdout=stream, stderr=stream)
+                subprocess.Popen(command, env=env, cwd=ROOT, stdout=stream, stderr=stream)
             )
         end = time.monotonic() + 60
         while until not in said.read_text():
@@ -52,20 +50,10 @@ class Dask:
             "scheduler", "--host", "127.0.0.1", "--port", str(self.port), until="Scheduler at"
         )
 
-    def worker(self, root: Path = ROOT) -> subprocess.Popen[bytes]:
-        """A worker with one thread that nobody starts again when it dies.
-
-        Its algid stands in `root`.
-        """
-        return self.start(
-            "worker",
-            self.address,
-            "--nthreads",
-            "1",
-            "--no-nanny",
-            until="Registered to",
-            root=root,
-        )
+    def worker(self) -> subprocess.Popen[bytes]:
+        """A worker with one thread that nobody starts again when it dies."""
+        flags = (self.address, "--nthreads", "1", "--no-nanny")
+        return self.start("worker", *flags, until="Registered to")
 
 
 @pytest.fixture

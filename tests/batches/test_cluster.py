@@ -127,14 +127,3 @@ def test_a_lost_scheduler_is_told_and_costs_no_job(logs: Path, tmp_path: Path, d
         f"d{n}.algid" for n in range(JOBS)
     )
     assert not list(ROOT.glob("out*"))
-
-
-@pytest.mark.slow
-def test_a_worker_of_another_version_is_told(logs: Path, tmp_path: Path, dask: Dask) -> None:
-    (tmp_path / "stub/algid").mkdir(parents=True)
-    (tmp_path / "stub/algid/__init__.py").write_text("__version__ = '0.0.1'\n")
-    dask.worker(root=tmp_path / "stub")
-    told, errors = _start(logs, tmp_path / "out", dask).communicate(timeout=60)
-    assert len(errors.splitlines()) == 1
-    assert "has algid 0.0.1; install algid" in errors
-    assert f"nothing done; 0 run now, {JOBS} left" in told

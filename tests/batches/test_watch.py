@@ -64,13 +64,3 @@ def test_settled_logs_are_taken_as_they_arrive_until_sigterm(
     assert dict(zip(table["job"], table["status"], strict=True)) == dict.fromkeys(
         ("a", "b", "growing"), "ok"
     )
-
-
-def test_ctrl_c_ends_the_watch_without_a_traceback(tmp_path: Path) -> None:
-    (tmp_path / "logs").mkdir()
-    running = _watching(tmp_path / "logs", tmp_path / "out")
-    wait_until((tmp_path / "out/jobs.parquet").exists)
-    running.send_signal(signal.SIGINT)
-    told, errors = running.communicate(timeout=PATIENCE)
-    assert (running.returncode, errors) == (0, "")
-    assert "nothing done" in told
