@@ -56,7 +56,8 @@ def codes(log: Log) -> list[str]:
 
 
 def test_a_clean_log_raises_nothing() -> None:
-    assert noticed(moving_log()) == ()
+    found = inspect_log(moving_log())
+    assert (repr(found), found.contradicted) == ("Inspection('arm.csv', nothing found)", False)
 
 
 REFUSED = ("EFFORT_ZERO", "WRAPPED_ANGLE", "DEGREES")
@@ -118,7 +119,9 @@ def test_encoders_and_rest_make_no_lost_samples() -> None:
 
 def test_a_refusal_names_what_overrides_it_and_yields_to_that() -> None:
     log = spoiled("EFFORT_ZERO")
-    (refused,) = inspect_log(log).findings
+    found = inspect_log(log)
+    (refused,) = found.findings
+    assert repr(found).startswith("Inspection('arm.csv', EFFORT_ZERO: tau2 is zero")
     assert refused.advice.endswith("to use it nevertheless: --accept EFFORT_ZERO")
     reading = replace(log.origin.reading, accepted=("EFFORT_ZERO",))
     accepted = noticed(replace(log, origin=replace(log.origin, reading=reading)))[0]

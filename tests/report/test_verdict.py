@@ -190,6 +190,16 @@ def test_the_verdict_on_a_change(result: Result, name: str) -> None:
     assert case.words in found.sentence
 
 
+def test_the_quantile_is_that_of_the_intervals_and_the_delay_that_of_the_torque(
+    result: Result,
+) -> None:
+    wide = Estimate(estimate=1.0, std=2.0, ci95=(-4.0, 6.0), unit="s")
+    late = alone(result, LOST).model_copy(update={"payload": {"m_p": wide}})
+    assert (late.quantile, late.delay) == (2.5, None)
+    assert alone(result, LOST).quantile == pytest.approx(1.96, abs=1e-3)
+    assert of(result, wide, "delay").delay == wide
+
+
 TYPED = "algid identify 'a b.csv' -o out"
 
 
