@@ -16,7 +16,6 @@ import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -64,19 +63,25 @@ ONE, OTHER = (
     for case, seed in (("case1", 3), ("case2", 4))
 )
 N = len(ONE)
-ROWS = range(N)
+ROWS = np.arange(N)
 HALF = N // 2
-FIRST_HALF = np.arange(N) < HALF
-NS = np.arange(N) * 5_000_000
+FIRST_HALF = ROWS < HALF
+NS = ROWS * 5_000_000
 T, TH, TA = NS * 1e-9, ONE.theta, ONE.tau
 OM = np.gradient(TH, T, axis=1)
 DEG = np.degrees(TH)
+MNM = TA * 1e3
 LBF_IN = TORQUE["lbf in"]
 I10 = np.rint(TA * 100).astype(np.int16)
-MRAD, MNM = np.rint(TH * 1e3), np.rint(TA * 1e3)
+WHOLE_MRAD, WHOLE_MNM = np.rint(TH * 1e3), np.rint(MNM)
 BAD = np.zeros(N, bool)
 BAD[[50, 51, 52, 300, 301, 450]] = True
-FOURTH = np.arange(N) % 4 == 0
+FOURTH = ROWS % 4 == 0
+HELD = TA[:, ROWS // 4 * 4]
+SWAPPED = {"position": TH[::-1], "effort": TA[::-1], "name": ("j2", "j1")}
+OTHER_ARM = {"position": OTHER.theta, "effort": OTHER.tau}
+Columns = dict[str, Any]
+Written = Callable[[str, Path], Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +93,9 @@ class Fact:
     """
 
     label: str
-    flat: Callable[[], Flat | dict[str, Any]] | None = None
-    states: Callable[[], States | list[Message]] | None = None
-    file: Callable[[str, Path], Any] | None = None
+    flat: Flat | Columns | None = None
+    states: States | list[Message] | None = None
+    file: Written | None = None
     ways: tuple[str, ...] = (*FLAT, "json")
     options: Mapping[str, Any] = field(default_factory=dict)
     truth: tuple[FloatArray, FloatArray, FloatArray] = (T, TH, TA)
@@ -104,52 +109,66 @@ class Fact:
         """The log in one way; raises `CannotSayError` where it has no place for the fact."""
         if self.file is not None:
             return self.file(way, folder)
-        log = self._states if way in LISTS + MESSAGES and self._states else self._columns
-        if log is None or (isinstance(log, Flat) and way not in self.ways):
+        if way in LISTS + MESSAGES and self.states:
+            sent = self.states
+            return written(way, folder, States(sent) if isinstance(sent, list) else sent)
+        if self.flat is None or way not in self.ways:
             raise CannotSayError
-        return written(way, folder, log)
-
-    @cached_property
-    def _columns(self) -> Flat | None:
-        flat = self.flat and self.flat()
-        return Flat(flat) if isinstance(flat, dict) else flat or None
-
-    @cached_property
-    def _states(self) -> States | None:
-        states = self.states and self.states()
-        return States(states) if isinstance(states, list) else states or None
+        flat = self.flat
+        return written(way, folder, Flat(flat) if isinstance(flat, dict) else flat)
 
 
-def base(**columns: Any) -> dict[str, Any]:
-    """The log's columns, some of them others, and some more."""
-    return {"time": T, "q1": TH[0], "q2": TH[1], "tau1": TA[0], "tau2": TA[1]} | columns
+def pair(form: str, rows: Any) -> Columns:
+    """Two columns, named by their joints."""
+    return {form.format(joint): row for joint, row in enumerate(rows, start=1)}
 
 
-def renamed(columns: dict[str, Any], **names: str) -> dict[str, Any]:
-    return {names.get(name, name): values for name, values in columns.items()}
+def base(
+    angle: str = "q{}", torque: str = "tau{}", q: Any = TH, tau: Any = TA, **columns: Any
+) -> Columns:
+    """The log's columns, some of them others or of another name, and some more."""
+    return {"time": T, **pair(angle, q), **pair(torque, tau)} | columns
 
 
-def message(row: int, **changes: Any) -> Message:
-    """A row as a joint state; a stamp is that of the recorder too, where nothing else is said."""
-    stamp = changes.pop("stamp", EPOCH + int(NS[row]))
-    values = {"position": TH[:, row], "effort": TA[:, row], "log_stamp": stamp} | changes
-    for name in ("position", "effort", "velocity"):
-        if name in values:
-            values[name] = tuple(float(value) for value in values[name])
-    return Message(stamp=stamp, **values)
+def clock(name: str, values: Any, angle: str = "q{}") -> Columns:
+    """The log's columns behind another time."""
+    columns = base(angle)
+    del columns["time"]
+    return {name: values, **columns}
 
 
-def messages(changed: Callable[[int], Mapping[str, Any]] = lambda _: {}) -> list[Message]:
-    """Every row as a message, with what `changed` says of it."""
-    return [message(row, **changed(row)) for row in ROWS]
+def messages(where: Any = ROWS >= 0, **changes: Any) -> list[Message]:
+    """Every row as a joint state, with `changes` where these are to be: arrays, taken by row, or
+    what is the same in all.
+
+    A stamp is that of the recorder too, where nothing else is said.
+    """
+    found = []
+    for row in ROWS:
+        own: Columns = {"position": TH, "effort": TA, "stamp": EPOCH + NS}
+        own = {
+            name: value[..., row] if isinstance(value, np.ndarray) else value
+            for name, value in (own | changes if where[row] else own).items()
+        }
+        own["stamp"] = int(own["stamp"])
+        own["log_stamp"] = int(own.get("log_stamp", own["stamp"]))
+        for name in {"position", "effort", "velocity"} & own.keys():
+            own[name] = tuple(map(float, own[name]))
+        found.append(Message(**own))
+    return found
 
 
-def units(columns: dict[str, Any], *names: str) -> Flat:
+def either(first: Any, one: list[Message], other: list[Message]) -> list[Message]:
+    return [a if of_one else b for of_one, a, b in zip(first, one, other, strict=True)]
+
+
+def units(columns: Columns, names: str) -> Flat:
     """Columns whose units stand beside them: attributes, or a row of units."""
-    return Flat(columns, {key: {"units": unit} for key, unit in zip(columns, names, strict=True)})
+    pairs = zip(columns, names.split(","), strict=True)
+    return Flat(columns, {key: {"units": unit} for key, unit in pairs})
 
 
-def defined(position: str, effort: str, sent: list[Message]) -> States:
+def defined(sent: list[Message], position: str = "", effort: str = "") -> States:
     """Messages whose definition has comments behind two fields."""
     text = JOINT_STATE_DEFINITION.replace("float64[] position", f"float64[] position{position}")
     return States(sent, text.replace("float64[] effort", f"float64[] effort{effort}"))
@@ -161,123 +180,71 @@ def spoiled(values: Any, rows: Any, value: Any, dtype: Any = float) -> Any:
     return changed
 
 
-def missing(value: Any, dtype: Any = float) -> dict[str, Any]:
+def missing(value: Any, dtype: Any = float) -> Columns:
     return base(tau1=spoiled(TA[0], BAD, value, dtype), q2=spoiled(TH[1], BAD, value, dtype))
 
 
 def missing_in_messages(value: float) -> list[Message]:
-    return messages(
-        lambda row: (
-            {"effort": (value, TA[1, row]), "position": (TH[0, row], value)} if BAD[row] else {}
-        )
-    )
+    _, *angles, one, other = missing(value).values()
+    return messages(position=np.stack(angles), effort=np.stack([one, other]))
 
 
-def in_mnm() -> dict[str, Any]:
-    return base(tau1=TA[0] * 1e3, tau2=TA[1] * 1e3)
+REST = slice(N - HALF)
+TWO_ARMS = base(
+    q=np.c_[TH[:, :HALF], OTHER.theta[:, REST]],
+    tau=np.c_[TA[:, :HALF], OTHER.tau[:, REST]],
+    time=np.r_[T[:HALF], T[REST]],
+)
+"""Another arm behind the first one, whose time starts again."""
+EVEN = ROWS % 2 == 0
+REVERSED = {name: base()[name] for name in ("time", "q2", "q1", "tau2", "tau1")}
 
 
-def in_degrees() -> dict[str, Any]:
-    return base(q1=DEG[0], q2=DEG[1])
-
-
-def effort(scale: float) -> list[Message]:
-    return messages(lambda row: {"effort": scale * TA[:, row]})
-
-
-def swapped(row: int) -> dict[str, Any]:
-    return {"position": TH[::-1, row], "effort": TA[::-1, row], "name": ("j2", "j1")}
-
-
-def other_arm(row: int) -> dict[str, Any]:
-    return {"position": OTHER.theta[:, row], "effort": OTHER.tau[:, row]}
-
-
-def two_arms() -> dict[str, Any]:
-    """Another arm behind the first one, whose time starts again."""
-    rest = N - HALF
-    return {
-        "time": np.r_[T[:HALF], T[:rest]],
-        "q1": np.r_[TH[0][:HALF], OTHER.theta[0][:rest]],
-        "q2": np.r_[TH[1][:HALF], OTHER.theta[1][:rest]],
-        "tau1": np.r_[TA[0][:HALF], OTHER.tau[0][:rest]],
-        "tau2": np.r_[TA[1][:HALF], OTHER.tau[1][:rest]],
-    }
-
-
-def interleaved() -> dict[str, Any]:
-    even = np.arange(N) % 2 == 0
-    others = {"q1": OTHER.theta[0], "q2": OTHER.theta[1], "tau1": OTHER.tau[0]}
-    others["tau2"] = OTHER.tau[1]
-    mixed = {name: np.where(even, base()[name], other) for name, other in others.items()}
-    return {"time": T, "robot": np.where(even, "A", "B"), **mixed}
-
-
-def typed(change: Callable[[Any], Any]) -> Callable[[], dict[str, Any]]:
-    """The columns but for the time in another type."""
-    return lambda: {name: v if name == "time" else change(v) for name, v in base().items()}
-
-
-def all_typed(change: Callable[[Any], Any]) -> Callable[[], dict[str, Any]]:
-    return lambda: {name: change(v) for name, v in base().items()}
-
-
-def without_time() -> dict[str, Any]:
-    return {name: v for name, v in base().items() if name != "time"}
+def typed(change: Callable[[Any], Any], time: bool = True) -> Columns:
+    """The columns in another type, their time too or not."""
+    return {name: change(v) if time or name != "time" else v for name, v in base().items()}
 
 
 THREE = ("waist", "shoulder", "elbow")
 TH3, TA3 = np.vstack([0.3 * np.sin(T), TH]), np.vstack([np.sin(3 * T), TA])
+THREE_FLAT = {
+    "time": T,
+    **{f"{name}_pos": values for name, values in zip(THREE, TH3, strict=True)},
+    **{f"{name}_effort": values for name, values in zip(THREE, TA3, strict=True)},
+}
 
 
-def three() -> list[Message]:
-    return messages(lambda row: {"position": TH3[:, row], "effort": TA3[:, row], "name": THREE})
+def text_file(text: Callable[[str], str]) -> Written:
+    """A table of text, made for a separator."""
+
+    def of_text(way: str, folder: Path) -> Path:
+        if way not in _TEXT:
+            raise CannotSayError
+        path = folder / f"log.{way}"
+        path.write_text(text("," if way == "csv" else "\t"))
+        return path
+
+    return of_text
 
 
-def three_flat() -> dict[str, Any]:
-    angles = {f"{name}_pos": TH3[place] for place, name in enumerate(THREE)}
-    return {"time": T, **angles, **{f"{name}_effort": TA3[k] for k, name in enumerate(THREE)}}
+def header_again(separator: str) -> str:
+    first = csv_text(Flat(base()), separator).splitlines()[: HALF + 1]
+    rest = {name: values[HALF:] for name, values in REVERSED.items()}
+    return "\n".join([*first, csv_text(Flat(rest), separator)])
 
 
-def _text_ways(way: str) -> str:
-    """The separator of a way that is text."""
-    if way not in ("csv", "tsv"):
-        raise CannotSayError
-    return "," if way == "csv" else "\t"
+def commented(place: int, tau: Any) -> Written:
+    """A table with a comment in front of a line."""
+
+    def text(separator: str) -> str:
+        lines = csv_text(Flat(base(tau=tau)), separator).splitlines()
+        return "\n".join([*lines[:place], "# tau1, tau2 in mNm", *lines[place:], ""])
+
+    return text_file(text)
 
 
-def _saved(way: str, folder: Path, text: str) -> Path:
-    path = folder / f"log.{way}"
-    path.write_text(text)
-    return path
-
-
-def header_again(way: str, folder: Path) -> Path:
-    separator = _text_ways(way)
-    other = {"time": T, "q2": TH[1], "q1": TH[0], "tau2": TA[1], "tau1": TA[0]}
-    begin = csv_text(Flat(base()), separator).splitlines()[: HALF + 1]
-    rest = csv_text(Flat({name: v[HALF:] for name, v in other.items()}), separator)
-    return _saved(way, folder, "\n".join(begin) + "\n" + rest)
-
-
-def comment_midway(way: str, folder: Path) -> Path:
-    mixed = base(
-        **{n: np.where(FIRST_HALF, v, 1e3 * v) for n, v in zip(("tau1", "tau2"), TA, strict=True)}
-    )
-    lines = csv_text(Flat(mixed), _text_ways(way)).splitlines()
-    lines.insert(HALF + 1, "# tau1, tau2 in mNm")
-    return _saved(way, folder, "\n".join(lines) + "\n")
-
-
-def comment_behind_header(way: str, folder: Path) -> Path:
-    lines = csv_text(Flat(in_mnm()), _text_ways(way)).splitlines()
-    lines.insert(1, "# tau1, tau2 in mNm")
-    return _saved(way, folder, "\n".join(lines) + "\n")
-
-
-def decimal_comma(way: str, folder: Path) -> Path:
-    separator = ";" if _text_ways(way) == "," else "\t"
-    return _saved(way, folder, csv_text(Flat(base()), separator).replace(".", ","))
+def decimal_comma(separator: str) -> str:
+    return csv_text(Flat(base()), separator.replace(",", ";")).replace(".", ",")
 
 
 def named_matrix(way: str, folder: Path) -> Any:
@@ -335,16 +302,16 @@ def json_schema_unit(way: str, folder: Path) -> Path:
         raise CannotSayError
     torque = {"type": "number", "unit": "mNm", "description": "torque [mNm]"}
     kinds = {name: torque if name[:3] == "tau" else {"type": "number"} for name in base()}
-    columns = {name: v.tolist() for name, v in in_mnm().items() if name != "time"}
+    columns = {name: v.tolist() for name, v in base(tau=MNM).items() if name != "time"}
     objects = [dict(zip(columns, row, strict=True)) for row in _by_row(columns)]
     return _objects(folder, objects, {"type": "object", "properties": kinds})
 
 
-def indexed(index: Callable[[], Any]) -> Callable[[str, Path], Any]:
+def indexed(index: Any) -> Written:
     """A frame of pandas whose index is the time, or what such a frame is saved as."""
 
     def frame_in(way: str, folder: Path) -> Any:
-        frame = pd.DataFrame(without_time(), index=index())
+        frame = pd.DataFrame(base(), index=index).drop(columns="time")
         path = folder / f"log.{way}"
         if way == "pandas":
             return frame
@@ -386,75 +353,71 @@ def _arrays(way: str, folder: Path, content: dict[str, Any]) -> Any:
 
 
 def groups(way: str, folder: Path) -> Any:
-    runs: dict[str, Any] = {}
-    for k, log in enumerate((ONE, OTHER), start=1):
-        own = {"time": T, "q": log.theta.T.copy(), "tau": log.tau.T.copy()}
-        runs |= {f"run{k}.{name}": values for name, values in own.items()}
+    runs: Columns = {}
+    for run, log in (("run1", ONE), ("run2", OTHER)):
+        runs |= {f"{run}.time": T, f"{run}.q": log.theta.T.copy(), f"{run}.tau": log.tau.T.copy()}
     return _arrays(way, folder, runs)
 
 
 def own_stamps(way: str, folder: Path) -> Any:
     """Torques at a quarter of the rate, with a time of their own."""
-    content = {"t": T, "q1": TH[0], "q2": TH[1], "t_tau": T[FOURTH]}
-    content |= {"tau1": TA[0][FOURTH], "tau2": TA[1][FOURTH]}
-    return _arrays(way, folder, content)
+    angles = {"t": T, **pair("q{}", TH)}
+    return _arrays(way, folder, {**angles, "t_tau": T[FOURTH], **pair("tau{}", TA[:, FOURTH])})
 
 
 def effort_elsewhere() -> list[Message]:
-    sent = []
-    for row in ROWS:
-        sent.append(message(row, effort=(), topic="/q"))
-        if row < 0.7 * N:
-            sent.append(message(row, position=(), topic="/tau"))
-    return sent
+    """Torques on a topic of their own, which ends early."""
+    both = zip(messages(effort=(), topic="/q"), messages(position=(), topic="/tau"), strict=True)
+    found = []
+    for row, sent in enumerate(both):
+        found += sent if row < 0.7 * N else sent[:1]
+    return found
 
 
 def column_twice(way: str, folder: Path) -> Any:
     path = folder / f"log.{way}"
+    objects = [dict(zip(base(), map(float, row), strict=True)) for row in _by_row(base())]
+    texts = [json.dumps(one)[:-1] + ', "tau1": 5.0}' for one in objects]
+    table = arrow_table(Flat(base())).append_column("tau1", pa.array(np.full(N, 5.0)))
+
+    def of_text(separator: str) -> str:
+        header, *rows = csv_text(Flat(base()), separator).splitlines()
+        return "\n".join([f"{header}{separator}tau1", *(f"{row}{separator}5" for row in rows), ""])
+
     match way:
-        case "csv" | "tsv":
-            separator = _text_ways(way)
-            header, *rows = csv_text(Flat(base()), separator).splitlines()
-            lines = [f"{header}{separator}tau1", *(f"{row}{separator}5" for row in rows)]
-            return _saved(way, folder, "\n".join(lines) + "\n")
-        case "jsonl" | "json":
-            objects = [dict(zip(base(), map(float, row), strict=True)) for row in _by_row(base())]
-            texts = [json.dumps(one)[:-1] + ', "tau1": 5.0}' for one in objects]
-            if way == "json":
-                return json_mcap(
-                    folder, [(int(NS[k]), text.encode()) for k, text in enumerate(texts)]
-                )
+        case "json":
+            return json_mcap(
+                folder,
+                [(stamp, text.encode()) for stamp, text in zip(NS.tolist(), texts, strict=True)],
+            )
+        case "jsonl":
             path.write_text("\n".join(texts) + "\n")
-        case "parquet" | "feather":
-            table = arrow_table(Flat(base())).append_column("tau1", pa.array(np.full(N, 5.0)))
-            if way == "parquet":
-                parquet.write_table(table, path)
-            else:
-                with pa.OSFile(str(path), "wb") as out, pa.ipc.new_file(out, table.schema) as file:
-                    file.write_table(table)
+        case "parquet":
+            parquet.write_table(table, path)
+        case "feather":
+            with pa.OSFile(str(path), "wb") as out, pa.ipc.new_file(out, table.schema) as file:
+                file.write_table(table)
         case "pandas":
             frame = pd.DataFrame(base())
             frame.insert(5, "tau1", 5.0, allow_duplicates=True)
             return frame
         case _:
-            raise CannotSayError
+            return text_file(of_text)(way, folder)
     return path
 
 
-def encoded(
-    encoding: str, ways: tuple[str, ...], columns: Callable[[], dict[str, Any]] = base
-) -> Callable[[str, Path], Path]:
+def encoded(encoding: str, ways: tuple[str, ...], columns: Columns) -> Written:
     def recoded(way: str, folder: Path) -> Path:
         if way not in ways:
             raise CannotSayError
-        path: Path = written(way, folder, Flat(columns()))
+        path: Path = written(way, folder, Flat(columns))
         path.write_bytes(path.read_text().encode(encoding))
         return path
 
     return recoded
 
 
-def packed(suffix: str, pack: Callable[[bytes], bytes]) -> Callable[[str, Path], Path]:
+def packed(suffix: str, pack: Callable[[bytes], bytes]) -> Written:
     def packed_file(way: str, folder: Path) -> Path:
         if way not in ("csv", "tsv", "jsonl", "parquet", "npz", "h5", "cdr", "bag1"):
             raise CannotSayError
@@ -491,13 +454,9 @@ def two_logs(way: str, folder: Path) -> Path:
     for place, (log, name) in enumerate(((ONE, "mon"), (OTHER, "tue"))):
         own = folder / name
         own.mkdir()
-        columns = base(q1=log.theta[0], q2=log.theta[1], tau1=log.tau[0], tau2=log.tau[1])
-        sent = []
-        for row in ROWS:
-            stamp = EPOCH + int(NS[row]) + place * 10**11
-            sent.append(
-                message(row, position=log.theta[:, row], effort=log.tau[:, row], stamp=stamp)
-            )
+        columns = base(q=log.theta, tau=log.tau)
+        stamps = EPOCH + NS + place * 10**11
+        sent = messages(position=log.theta, effort=log.tau, stamp=stamps)
         path: Path = written(way, own, Flat(columns) if way in FLAT else States(sent))
         if path.is_dir():
             path = next(path.glob("*.db3"))
@@ -505,7 +464,7 @@ def two_logs(way: str, folder: Path) -> Path:
     return both
 
 
-def with_truth(change: bool) -> Callable[[str, Path], Path]:
+def with_truth(change: bool) -> Written:
     """A log that algid wrote with its truth; a value may be changed behind it."""
 
     def of_algid(way: str, folder: Path) -> Path:
@@ -531,23 +490,24 @@ def with_truth(change: bool) -> Callable[[str, Path], Path]:
     return of_algid
 
 
-def cut_short() -> dict[str, Any]:
-    """30 rows are missing in the middle, and the time goes on."""
-    cut = {name: np.r_[v[:HALF], v[HALF + 30 :]] for name, v in base().items()}
-    return cut | {"time": T[: N - 30], "episode_index": (np.arange(N - 30) >= HALF).astype(int)}
+LEFT = N - 30
+# 30 rows are missing in the middle, and the time goes on
+CUT_SHORT = base(
+    q=np.c_[TH[:, :HALF], TH[:, HALF + 30 :]],
+    tau=np.c_[TA[:, :HALF], TA[:, HALF + 30 :]],
+    time=T[:LEFT],
+    episode_index=(ROWS[:LEFT] >= HALF).astype(int),
+)
+LEROBOT = {
+    "observation.state": TH.T.tolist(),
+    "observation.effort": TA.T.tolist(),
+    "timestamp": TWO_ARMS["time"].astype(np.float32),
+    "episode_index": (~FIRST_HALF).astype(int),
+    "frame_index": np.r_[ROWS[:HALF], ROWS[REST]],
+}
 
 
-def lerobot() -> dict[str, Any]:
-    return {
-        "observation.state": TH.T.tolist(),
-        "observation.effort": TA.T.tolist(),
-        "timestamp": np.r_[T[:HALF], T[: N - HALF]].astype(np.float32),
-        "episode_index": (~FIRST_HALF).astype(int),
-        "frame_index": np.r_[np.arange(HALF), np.arange(N - HALF)],
-    }
-
-
-def zone_changes() -> dict[str, Any]:
+def zone_changes() -> Columns:
     texts = []
     for row in ROWS:
         start = datetime.datetime(2026, 3, 4, 10 + (row >= HALF))
@@ -557,487 +517,410 @@ def zone_changes() -> dict[str, Any]:
     return base(time=np.array(texts))
 
 
-def masked() -> dict[str, Any]:
+def masked() -> Columns:
     columns = missing(-5.0)
-    for name in ("tau1", "q2"):
-        columns[name] = np.ma.MaskedArray(columns[name], mask=BAD)
-    return columns
+    hidden = {name: np.ma.MaskedArray(columns[name], mask=BAD) for name in ("tau1", "q2")}
+    return columns | hidden
+
+
+def quarter(value: Any, dtype: Any = float) -> Columns:
+    return base(tau=[spoiled(row, ~FOURTH, value, dtype) for row in TA])
 
 
 _LATE = np.random.default_rng(1).integers(0, 3_000_000, N)
 _WILD = {"tau1": spoiled(TA[0], BAD, 40.0), "q2": spoiled(TH[1], BAD, 0.0)}
-_COMMENTED = ("csv", "tsv", "parquet", "feather", "h5", "mat", "npz", "pandas")
 _TEXT = ("csv", "tsv")
+_COMMENTED = (*_TEXT, "parquet", "feather", "h5", "mat", "npz", "pandas")
 _VELOCITY = {"velocity": "measured"}
 _SCALED = {"scale_factor": "0.001", "add_offset": "0.5"}
 _TEN = {"scale_factor": "0.01", "units": "N m"}
-_BY_ATTRIBUTE = "s", "rad", "rad"
-
-
-def _quarter(value: Any, dtype: Any = float) -> dict[str, Any]:
-    held = {n: spoiled(v, ~FOURTH, value, dtype) for n, v in zip(("tau1", "tau2"), TA, strict=True)}
-    return base(**held)
-
-
-def _clocks(name: str, values: Any) -> Callable[[], dict[str, Any]]:
-    return lambda: renamed(base(time=values), time=name)
-
-
-def _of_time(values: Any, unit: str) -> Callable[[], Flat]:
-    return lambda: units(base(time=values), unit, "rad", "rad", "Nm", "Nm")
+_SENTINEL = {"_FillValue": "-9999"}
+_PLAIN = "s,rad,rad,"
+IN_MNM = base(tau=MNM)
+IN_DEGREES = base(q=DEG)
+DATES = (EPOCH + NS).astype("datetime64[ns]")
+LABELS = np.where(FIRST_HALF, "A", "B")
 
 
 FACTS = (
     # joints
-    Fact(
-        "order of columns or names reversed throughout",
-        lambda: {"time": T, "q2": TH[1], "q1": TH[0], "tau2": TA[1], "tau1": TA[0]},
-        lambda: messages(swapped),
-    ),
-    Fact(
-        "order of names changes midway",
-        states=lambda: messages(lambda row: {} if row < HALF else swapped(row)),
-        within=1e-8,
-    ),
-    Fact("header row again midway, other order", file=header_again),
+    Fact("order of columns or names reversed throughout", REVERSED, messages(**SWAPPED)),
+    Fact("order of names changes midway", states=messages(~FIRST_HALF, **SWAPPED), within=1e-8),
+    Fact("header row again midway, other order", file=text_file(header_again)),
     Fact(
         "named shoulder and elbow, elbow first",
-        lambda: {
+        {
             "time": T,
             "elbow_pos": TH[1],
             "shoulder_pos": TH[0],
             "elbow_effort": TA[1],
             "shoulder_effort": TA[0],
         },
-        lambda: messages(lambda row: {**swapped(row), "name": ("elbow", "shoulder")}),
+        messages(**SWAPPED | {"name": ("elbow", "shoulder")}),
     ),
-    Fact("three joints, none chosen", three_flat, three, says_other=True),
+    Fact(
+        "three joints, none chosen",
+        THREE_FLAT,
+        messages(position=TH3, effort=TA3, name=THREE),
+        says_other=True,
+    ),
     Fact(
         "three joints, joints=shoulder,elbow",
-        three_flat,
-        three,
+        THREE_FLAT,
+        messages(position=TH3, effort=TA3, name=THREE),
         options={"joints": ("shoulder", "elbow")},
     ),
     Fact(
         "two joints, joints=j2,j1",
-        states=messages,
+        states=messages(),
         options={"joints": ("j2", "j1")},
         truth=(T, TH[::-1], TA[::-1]),
     ),
     Fact("matrices with their names stated (elbow, shoulder)", file=named_matrix),
     Fact(
         "every tenth message of one joint only",
-        states=lambda: messages(
-            lambda row: (
-                {"position": TH[:1, row], "effort": TA[:1, row], "name": ("j1",)}
-                if row % 10 == 5
-                else {}
-            )
-        ),
-        keep=np.arange(N) % 10 != 5,
+        states=messages(ROWS % 10 == 5, position=TH[:1], effort=TA[:1], name=("j1",)),
+        keep=ROWS % 10 != 5,
         within=1e-8,
     ),
     Fact(
         "joints renamed midway (a,b then c,d)",
-        states=lambda: messages(lambda row: {"name": ("a", "b") if row < HALF else ("c", "d")}),
+        states=either(FIRST_HALF, messages(name=("a", "b")), messages(name=("c", "d"))),
         keep=FIRST_HALF,
         says_other=True,
     ),
     # units
-    Fact("angle: q1 [deg]", lambda: renamed(in_degrees(), q1="q1 [deg]", q2="q2 [deg]")),
-    Fact("angle: q1_deg", lambda: renamed(in_degrees(), q1="q1_deg", q2="q2_deg")),
-    Fact("torque: tau1 [mNm]", lambda: renamed(in_mnm(), tau1="tau1 [mNm]", tau2="tau2 [mNm]")),
-    Fact("torque: tau1_mnm", lambda: renamed(in_mnm(), tau1="tau1_mnm", tau2="tau2_mnm")),
+    Fact("angle: q1 [deg]", base("q{} [deg]", q=DEG)),
+    Fact("angle: q1_deg", base("q{}_deg", q=DEG)),
+    Fact("torque: tau1 [mNm]", base(torque="tau{} [mNm]", tau=MNM)),
+    Fact("torque: tau1_mnm", base(torque="tau{}_mnm", tau=MNM)),
     Fact(
         "angle deg: attribute, units row, comment of a definition",
-        lambda: units(in_degrees(), "s", "deg", "deg", "Nm", "Nm"),
-        lambda: defined(" # deg", "", messages(lambda row: {"position": DEG[:, row]})),
+        units(IN_DEGREES, "s,deg,deg,Nm,Nm"),
+        defined(messages(position=DEG), position=" # deg"),
     ),
     Fact(
         "torque mNm: attribute, units row, comment of a definition",
-        lambda: units(in_mnm(), *_BY_ATTRIBUTE, "mNm", "mNm"),
-        lambda: defined("", "  # torque in mNm", effort(1e3)),
+        units(IN_MNM, _PLAIN + "mNm,mNm"),
+        defined(messages(effort=MNM), effort="  # torque in mNm"),
     ),
     Fact(
         "torque mNm: metadata units={tau1: mNm}",
-        lambda: Flat(in_mnm(), metadata={"units": '{"tau1": "mNm", "tau2": "mNm"}'}),
-        lambda: States(effort(1e3), metadata={"units": '{"effort": "mNm", "position": "rad"}'}),
+        Flat(IN_MNM, metadata={"units": '{"tau1": "mNm", "tau2": "mNm"}'}),
+        States(messages(effort=MNM), metadata={"units": '{"effort": "mNm", "position": "rad"}'}),
     ),
     Fact(
         "torque mNm: comment or metadata 'tau1, tau2 in mNm'",
-        lambda: Flat(in_mnm(), metadata={"note": "tau1, tau2 in mNm"}),
+        Flat(IN_MNM, metadata={"note": "tau1, tau2 in mNm"}),
         ways=_COMMENTED,
     ),
     Fact("JSON schema says unit mNm", file=json_schema_unit),
     Fact(
         "torque unit foreign (percent) as attribute",
-        lambda: units(base(tau1=TA[0] * 3, tau2=TA[1] * 3), *_BY_ATTRIBUTE, "percent", "percent"),
+        units(base(tau=TA * 3), _PLAIN + "percent,percent"),
         says_other=True,
     ),
     Fact(
         "scale_factor 0.001, add_offset 0.5 as attribute",
-        lambda: Flat(
-            base(tau1=(TA[0] - 0.5) * 1e3, tau2=(TA[1] - 0.5) * 1e3),
-            {"tau1": _SCALED, "tau2": _SCALED},
-        ),
+        Flat(base(tau=(TA - 0.5) * 1e3), {"tau1": _SCALED, "tau2": _SCALED}),
     ),
     Fact(
         "dq1 [deg/s] velocities",
-        lambda: base(**{f"dq{k + 1} [deg/s]": np.degrees(OM[k]) for k in (0, 1)}),
+        base(**pair("dq{} [deg/s]", np.degrees(OM))),
         ways=tuple(way for way in (*FLAT, "json") if way != "h5"),
         omega=OM,
         options=_VELOCITY,
     ),
     Fact(
         "velocities deg/s as attribute",
-        lambda: units(
-            base(dq1=np.degrees(OM[0]), dq2=np.degrees(OM[1])),
-            *_BY_ATTRIBUTE,
-            "Nm",
-            "Nm",
-            "deg/s",
-            "deg/s",
-        ),
+        units(base(**pair("dq{}", np.degrees(OM))), _PLAIN + "Nm,Nm,deg/s,deg/s"),
         omega=OM,
         options=_VELOCITY,
     ),
     Fact(
         "velocities recorded",
-        lambda: base(dq1=OM[0], dq2=OM[1]),
-        lambda: messages(lambda row: {"velocity": OM[:, row]}),
+        base(**pair("dq{}", OM)),
+        messages(velocity=OM),
         omega=OM,
         within=1e-8,
     ),
     Fact(
         "torque lbf in: attribute, units row, comment of a definition",
-        lambda: units(
-            base(tau1=TA[0] / LBF_IN, tau2=TA[1] / LBF_IN), *_BY_ATTRIBUTE, "lbf in", "lbf in"
-        ),
-        lambda: defined("", "  # lbf in", effort(1 / LBF_IN)),
+        units(base(tau=TA / LBF_IN), _PLAIN + "lbf in,lbf in"),
+        defined(messages(effort=TA / LBF_IN), effort="  # lbf in"),
     ),
     Fact(
         "scale_factor 0.01 of int16 as attribute",
-        lambda: Flat(base(tau1=I10[0], tau2=I10[1]), {"tau1": _TEN, "tau2": _TEN}),
+        Flat(base(tau=I10), {"tau1": _TEN, "tau2": _TEN}),
         truth=(T, TH, I10 * 0.01),
     ),
     Fact(
         "comment '# tau1, tau2 in mNm' above the header",
-        lambda: Flat(in_mnm(), metadata={"tau1, tau2 in mNm": ""}),
+        Flat(IN_MNM, metadata={"tau1, tau2 in mNm": ""}),
         ways=_TEXT,
     ),
     Fact(
         "comment '# effort is logged in mNm'",
-        lambda: Flat(in_mnm(), metadata={"effort is logged in mNm": ""}),
+        Flat(IN_MNM, metadata={"effort is logged in mNm": ""}),
         ways=_TEXT,
     ),
     Fact(
         "constant column torque_unit='mNm' in each row",
-        lambda: {**in_mnm(), "torque_unit": np.full(N, "mNm")},
+        {**IN_MNM, "torque_unit": np.full(N, "mNm")},
     ),
     # time
-    Fact("time_ms, integers", _clocks("time_ms", NS // 10**6)),
-    Fact("time [us], float", _clocks("time [us]", NS / 1e3)),
-    Fact("time in ms by attribute or units row", _of_time(NS / 1e6, "ms")),
+    Fact("time_ms, integers", clock("time_ms", NS // 10**6)),
+    Fact("time [us], float", clock("time [us]", NS / 1e3)),
+    Fact(
+        "time in ms by attribute or units row",
+        units(base(time=NS / 1e6), "ms,rad,rad,Nm,Nm"),
+    ),
     Fact(
         "time in ms at 10 kHz by attribute or units row",
-        _of_time(NS * 2e-8, "ms"),
+        units(base(time=NS * 2e-8), "ms,rad,rad,Nm,Nm"),
         truth=(NS * 2e-11, TH, TA),
     ),
-    Fact("time in ms, integers, no word", _clocks("time", NS // 10**6)),
-    Fact("time in us uint64, no word", _clocks("time", (NS // 1000).astype(np.uint64))),
-    Fact(
-        "t canonical names, ms integers, no word",
-        lambda: renamed(base(time=NS // 10**6), time="t", q1="theta1", q2="theta2"),
-    ),
-    Fact("epoch ns integers in 'time'", _clocks("time", EPOCH + NS)),
-    Fact("epoch ns uint64 in 'time'", _clocks("time", (EPOCH + NS).astype(np.uint64))),
-    Fact(
-        "epoch ns integers in 't', canonical names",
-        lambda: renamed(base(time=EPOCH + NS), time="t", q1="theta1", q2="theta2"),
-    ),
-    Fact("epoch s float in 'time'", _clocks("time", (EPOCH + NS) * 1e-9)),
-    Fact("datetime64 or ISO text", _clocks("time", (EPOCH + NS).astype("datetime64[ns]"))),
-    Fact("datetime with zone", lambda: base(time=Zoned(EPOCH + NS))),
-    Fact("duration (timedelta64)", _clocks("time", NS.astype("timedelta64[ns]"))),
-    Fact("duration (timedelta64[ms])", _clocks("time", (NS // 10**6).astype("timedelta64[ms]"))),
-    Fact("text hh:mm:ss.fff", lambda: base(time=np.array([f"10:00:{one:06.3f}" for one in T]))),
+    Fact("time in ms, integers, no word", base(time=NS // 10**6)),
+    Fact("time in us uint64, no word", base(time=(NS // 1000).astype(np.uint64))),
+    Fact("t canonical names, ms integers, no word", clock("t", NS // 10**6, "theta{}")),
+    Fact("epoch ns integers in 'time'", base(time=EPOCH + NS)),
+    Fact("epoch ns uint64 in 'time'", base(time=(EPOCH + NS).astype(np.uint64))),
+    Fact("epoch ns integers in 't', canonical names", clock("t", EPOCH + NS, "theta{}")),
+    Fact("epoch s float in 'time'", base(time=(EPOCH + NS) * 1e-9)),
+    Fact("datetime64 or ISO text", base(time=DATES)),
+    Fact("datetime with zone", base(time=Zoned(EPOCH + NS))),
+    Fact("duration (timedelta64)", base(time=NS.astype("timedelta64[ns]"))),
+    Fact("duration (timedelta64[ms])", base(time=(NS // 10**6).astype("timedelta64[ms]"))),
+    Fact("text hh:mm:ss.fff", base(time=np.array([f"10:00:{one:06.3f}" for one in T]))),
     Fact(
         "ISO text, zone changes midway, same instants",
-        zone_changes,
+        zone_changes(),
         ways=("csv", "tsv", "jsonl", "parquet", "pandas", "polars"),
     ),
     Fact(
         "CF: units='milliseconds since 2026-01-01'",
-        _of_time(NS / 1e6, "milliseconds since 2026-01-01"),
+        units(base(time=NS / 1e6), "milliseconds since 2026-01-01,rad,rad,Nm,Nm"),
     ),
-    Fact(
-        "index of dates, unnamed",
-        file=indexed(lambda: pd.DatetimeIndex((EPOCH + NS).astype("datetime64[ns]"))),
-    ),
+    Fact("index of dates, unnamed", file=indexed(pd.DatetimeIndex(DATES))),
     Fact(
         "index of durations, named 'time'",
-        file=indexed(lambda: pd.TimedeltaIndex(NS.astype("timedelta64[ns]"), name="time")),
+        file=indexed(pd.TimedeltaIndex(NS.astype("timedelta64[ns]"), name="time")),
     ),
-    Fact("index of float seconds, unnamed", file=indexed(lambda: T)),
+    Fact("index of float seconds, unnamed", file=indexed(T)),
     Fact(
         "no time; metadata say fs=200",
-        lambda: Flat(without_time(), metadata={"fs": "200", "sampling_rate": "200 Hz"}),
+        Flat(
+            {name: values for name, values in base().items() if name != "time"},
+            metadata={"fs": "200", "sampling_rate": "200 Hz"},
+        ),
     ),
     Fact(
         "metadata say fs=100 against stamps",
-        lambda: Flat(base(), metadata={"fs": "100", "sampling_rate": "100 Hz"}),
+        Flat(base(), metadata={"fs": "100", "sampling_rate": "100 Hz"}),
         says_other=True,
     ),
-    Fact("a stamp NaN", lambda: base(time=spoiled(T, BAD, np.nan)), keep=~BAD),
-    Fact("a stamp infinite", lambda: base(time=spoiled(T, BAD, np.inf)), keep=~BAD),
-    Fact("a stamp null", lambda: base(time=spoiled(T, BAD, None, object)), keep=~BAD),
+    Fact("a stamp NaN", base(time=spoiled(T, BAD, np.nan)), keep=~BAD),
+    Fact("a stamp infinite", base(time=spoiled(T, BAD, np.inf)), keep=~BAD),
+    Fact("a stamp null", base(time=spoiled(T, BAD, None, object)), keep=~BAD),
     Fact(
         "log stamps late and jittered, header right",
-        states=lambda: messages(
-            lambda row: {"log_stamp": EPOCH + int(NS[row] + 20_000_000 + _LATE[row])}
-        ),
+        states=messages(log_stamp=EPOCH + NS + 20_000_000 + _LATE),
         within=1e-8,
     ),
     Fact(
         "header stamps all zero, log stamps right",
-        states=lambda: messages(lambda row: {"stamp": 0, "log_stamp": EPOCH + int(NS[row])}),
+        states=messages(stamp=0, log_stamp=EPOCH + NS),
         within=1e-8,
     ),
     Fact(
         "header stamp steps 5 s back midway (clock set)",
-        states=lambda: messages(
-            lambda row: {
-                "stamp": EPOCH + int(NS[row]) - (5_000_000_000 if row >= HALF else 0),
-                "log_stamp": EPOCH + int(NS[row]),
-            }
+        states=messages(
+            stamp=EPOCH + NS - 5_000_000_000 * ~FIRST_HALF,
+            log_stamp=EPOCH + NS,
         ),
         says_other=True,
     ),
     # missing values
-    Fact("null cells", lambda: missing(None, object), keep=~BAD),
-    Fact("NaN", lambda: missing(np.nan), lambda: missing_in_messages(np.nan), keep=~BAD),
+    Fact("null cells", missing(None, object), keep=~BAD),
+    Fact("NaN", missing(np.nan), missing_in_messages(np.nan), keep=~BAD),
     Fact(
         "NaN, accept=NOT_FINITE",
-        lambda: missing(np.nan),
-        lambda: missing_in_messages(np.nan),
+        missing(np.nan),
+        missing_in_messages(np.nan),
         keep=~BAD,
         options={"accept": ["NOT_FINITE"]},
     ),
-    Fact("masked (np.ma, NA, null under a mask)", masked, keep=~BAD),
-    Fact(
-        "sentinel -9999", lambda: missing(-9999.0), lambda: missing_in_messages(-9999.0), keep=~BAD
-    ),
-    Fact("sentinel 1e30", lambda: missing(1e30), lambda: missing_in_messages(1e30), keep=~BAD),
+    Fact("masked (np.ma, NA, null under a mask)", masked(), keep=~BAD),
+    Fact("sentinel -9999", missing(-9999.0), missing_in_messages(-9999.0), keep=~BAD),
+    Fact("sentinel 1e30", missing(1e30), missing_in_messages(1e30), keep=~BAD),
     Fact(
         "sentinel 0 in torque alone",
-        lambda: base(tau1=spoiled(TA[0], BAD, 0), tau2=spoiled(TA[1], BAD, 0)),
-        lambda: messages(lambda row: {"effort": (0, 0)} if BAD[row] else {}),
+        base(tau=spoiled(TA, np.s_[:, BAD], 0)),
+        messages(BAD, effort=(0, 0)),
         keep=~BAD,
     ),
     Fact(
         "sentinel stated: _FillValue, missing_value of the file",
-        lambda: Flat(missing(-9999.0), metadata={"_FillValue": "-9999", "missing_value": "-9999"}),
+        Flat(missing(-9999.0), metadata={**_SENTINEL, "missing_value": "-9999"}),
         ways=("h5", "parquet", "feather", "csv", "npz", "pandas"),
         keep=~BAD,
     ),
     Fact(
         "sentinel stated: _FillValue of the column",
-        lambda: Flat(missing(-9999.0), {name: {"_FillValue": "-9999"} for name in ("tau1", "q2")}),
+        Flat(missing(-9999.0), {"tau1": _SENTINEL, "q2": _SENTINEL}),
         ways=("h5", "parquet", "feather"),
         keep=~BAD,
     ),
     Fact(
         "cells N/A",
-        lambda: missing("N/A", object),
+        missing("N/A", object),
         ways=("csv", "tsv", "jsonl", "pandas"),
         keep=~BAD,
     ),
     Fact(
         "effort empty in some messages",
-        states=lambda: messages(lambda row: {"effort": ()} if BAD[row] else {}),
+        states=messages(BAD, effort=()),
         keep=~BAD,
         within=1e-8,
     ),
     # types of numbers
-    Fact("float32", typed(lambda v: v.astype(np.float32)), within=1e-5),
-    Fact("float16", typed(lambda v: v.astype(np.float16)), within=3e-2),
+    Fact("float32", typed(lambda v: v.astype(np.float32), time=False), within=1e-5),
+    Fact("float16", typed(lambda v: v.astype(np.float16), time=False), within=3e-2),
     Fact(
         "int16 in mrad and mNm",
-        lambda: {
-            "time": T,
-            "q1_mrad": MRAD[0].astype(np.int16),
-            "q2_mrad": MRAD[1].astype(np.int16),
-            "tau1_mnm": MNM[0].astype(np.int16),
-            "tau2_mnm": MNM[1].astype(np.int16),
-        },
-        truth=(T, MRAD * 1e-3, MNM * 1e-3),
+        base("q{}_mrad", "tau{}_mnm", WHOLE_MRAD.astype(np.int16), WHOLE_MNM.astype(np.int16)),
+        truth=(T, WHOLE_MRAD * 1e-3, WHOLE_MNM * 1e-3),
     ),
     Fact(
         "big-endian float64",
-        all_typed(lambda v: v.astype(">f8")),
+        typed(lambda v: v.astype(">f8")),
         ways=("npz", "mat", "h5", "dict", "pandas", "arrays"),
     ),
     Fact(
         "decimal",
-        all_typed(lambda v: np.array([Decimal(f"{one:.9f}") for one in v], object)),
+        typed(lambda v: np.array([Decimal(f"{one:.9f}") for one in v], object)),
         ways=("parquet", "feather", "pandas", "polars", "dict", "arrays"),
         within=1e-8,
     ),
     Fact(
         "object of floats",
-        all_typed(lambda v: v.astype(object)),
+        typed(lambda v: v.astype(object)),
         ways=("pandas", "polars", "dict", "arrays", "parquet"),
     ),
-    Fact("list of floats", all_typed(lambda v: v.tolist()), ways=("dict",)),
+    Fact("list of floats", typed(lambda v: v.tolist()), ways=("dict",)),
     Fact(
         "text numbers",
-        all_typed(lambda v: np.array([repr(float(one)) for one in v])),
+        typed(lambda v: np.array([repr(float(one)) for one in v])),
         ways=("jsonl", "parquet", "feather", "npz", "h5", "dict", "pandas", "polars", "json"),
         within=1e-8,
     ),
-    Fact("decimal comma", file=decimal_comma),
-    Fact("torque is boolean", lambda: base(tau1=TA[0] > 0, tau2=TA[1] > 0), says_other=True),
+    Fact("decimal comma", file=text_file(decimal_comma)),
+    Fact("torque is boolean", base(tau=TA > 0), says_other=True),
     Fact(
         "complex",
-        lambda: base(tau1=TA[0] + 1j, tau2=TA[1] + 1j),
+        base(tau=TA + 1j),
         ways=("npz", "mat", "h5", "dict", "pandas", "arrays"),
         says_other=True,
     ),
     # quality, runs, robots
-    Fact("valid=false on wild rows (bool)", lambda: base(**_WILD, valid=~BAD), keep=~BAD),
-    Fact("valid=0 on wild rows (int)", lambda: base(**_WILD, valid=(~BAD).astype(int)), keep=~BAD),
-    Fact(
-        "error_code != 0 on wild rows",
-        lambda: base(**_WILD, error_code=np.where(BAD, 17, 0)),
-        keep=~BAD,
-    ),
+    Fact("valid=false on wild rows (bool)", base(**_WILD, valid=~BAD), keep=~BAD),
+    Fact("valid=0 on wild rows (int)", base(**_WILD, valid=(~BAD).astype(int)), keep=~BAD),
+    Fact("error_code != 0 on wild rows", base(**_WILD, error_code=np.where(BAD, 17, 0)), keep=~BAD),
     Fact(
         "runs of two arms, time restarts",
-        two_arms,
-        lambda: messages(
-            lambda row: (
-                {} if row < HALF else {**other_arm(row), "stamp": EPOCH + int(NS[row - HALF])}
-            )
-        ),
+        TWO_ARMS,
+        messages(~FIRST_HALF, **OTHER_ARM, stamp=EPOCH + NS - NS[HALF]),
         says_other=True,
     ),
-    Fact(
-        "the same with a column robot=A,B",
-        lambda: {**two_arms(), "robot": np.where(FIRST_HALF, "A", "B")},
-        says_other=True,
-    ),
+    Fact("the same with a column robot=A,B", {**TWO_ARMS, "robot": LABELS}, says_other=True),
     Fact(
         "episode_index 0,1; time goes on, arms differ",
-        lambda: {**two_arms(), "time": T, "episode_index": np.where(FIRST_HALF, 0, 1)},
+        {**TWO_ARMS, "time": T, "episode_index": np.where(FIRST_HALF, 0, 1)},
         says_other=True,
     ),
-    Fact("episode_index 0,1; time goes on, pose jumps", cut_short, says_other=True),
+    Fact("episode_index 0,1; time goes on, pose jumps", CUT_SHORT, says_other=True),
     Fact(
         "LeRobot columns, two episodes, stamps restart",
-        lerobot,
+        LEROBOT,
         ways=("parquet", "feather", "pandas", "polars", "jsonl"),
         says_other=True,
     ),
-    Fact("robot=A,B row by row, interleaved", interleaved, says_other=True),
+    Fact(
+        "robot=A,B row by row, interleaved",
+        base(
+            q=np.where(EVEN, TH, OTHER.theta),
+            tau=np.where(EVEN, TA, OTHER.tau),
+            robot=np.where(EVEN, "A", "B"),
+        ),
+        says_other=True,
+    ),
     Fact(
         "frame_id A,B message by message, two arms",
-        states=lambda: messages(
-            lambda row: {"frame": "A"} if row % 2 == 0 else {**other_arm(row), "frame": "B"}
-        ),
+        states=either(EVEN, messages(frame="A"), messages(**OTHER_ARM, frame="B")),
         says_other=True,
     ),
     Fact(
         "frame_id A then B, two arms, time goes on",
-        states=lambda: messages(
-            lambda row: {"frame": "A"} if row < HALF else {**other_arm(row), "frame": "B"}
-        ),
+        states=either(FIRST_HALF, messages(frame="A"), messages(**OTHER_ARM, frame="B")),
         says_other=True,
     ),
     Fact(
         "metadata: robot=A of the file, two arms",
-        lambda: Flat({**two_arms(), "time": T}, metadata={"robot": "A"}),
+        Flat({**TWO_ARMS, "time": T}, metadata={"robot": "A"}),
         ways=("csv",),
         says_other=True,
     ),
     Fact("groups or structs run1, run2 of two arms", file=groups, says_other=True),
     # meaning of the torque
-    Fact(
-        "only tau_cmd (commanded)",
-        lambda: renamed(base(), tau1="tau_cmd1", tau2="tau_cmd2"),
-        ways=tuple(FLAT),
-        says_other=True,
-    ),
-    Fact(
-        "only tau_ext (external)",
-        lambda: renamed(base(), tau1="tau_ext1", tau2="tau_ext2"),
-        ways=tuple(FLAT),
-        says_other=True,
-    ),
+    Fact("only tau_cmd (commanded)", base(torque="tau_cmd{}"), ways=tuple(FLAT), says_other=True),
+    Fact("only tau_ext (external)", base(torque="tau_ext{}"), ways=tuple(FLAT), says_other=True),
     Fact(
         "current1 [A], no constant",
-        lambda: renamed(base(), tau1="current1 [A]", tau2="current2 [A]"),
+        base(torque="current{} [A]"),
         ways=tuple(FLAT),
         says_other=True,
     ),
     Fact(
         "unit A as attribute of tau1, comment of effort",
-        lambda: units(base(tau1=2 * TA[0], tau2=2 * TA[1]), *_BY_ATTRIBUTE, "A", "A"),
-        lambda: defined("", " # motor current [A]", effort(2)),
+        units(base(tau=2 * TA), _PLAIN + "A,A"),
+        defined(messages(effort=2 * TA), effort=" # motor current [A]"),
     ),
     Fact(
         "metadata: effort=gravity-compensated",
-        lambda: Flat(base(), metadata={"effort": "gravity-compensated"}),
-        lambda: States(messages(), metadata={"effort": "gravity-compensated"}),
+        Flat(base(), metadata={"effort": "gravity-compensated"}),
+        States(messages(), metadata={"effort": "gravity-compensated"}),
         says_other=True,
     ),
     Fact(
         "metadata: zero=hanging, theta2 absolute",
-        lambda: Flat(base(), metadata={"zero": "hanging", "second_angle": "absolute"}),
-        lambda: States(messages(), metadata={"zero": "hanging", "second_angle": "absolute"}),
+        Flat(base(), metadata={"zero": "hanging", "second_angle": "absolute"}),
+        States(messages(), metadata={"zero": "hanging", "second_angle": "absolute"}),
         says_other=True,
     ),
-    Fact(
-        "tau1, tau_cmd1 side by side (measured first)",
-        lambda: base(tau_cmd1=TA[0] * 2, tau_cmd2=TA[1] * 2),
-    ),
+    Fact("tau1, tau_cmd1 side by side (measured first)", base(**pair("tau_cmd{}", TA * 2))),
     Fact(
         "q_filt beside q_meas",
-        lambda: {
-            "time": T,
-            "q_filt1": TH[0] * 0.9,
-            "q_filt2": TH[1] * 0.9,
-            "q_meas1": TH[0],
-            "q_meas2": TH[1],
-            "tau1": TA[0],
-            "tau2": TA[1],
-        },
+        {"time": T, **pair("q_filt{}", TH * 0.9), **pair("q_meas{}", TH), **pair("tau{}", TA)},
     ),
     # rates within one log
-    Fact(
-        "torque at a quarter of the rate: null between",
-        lambda: _quarter(None, object),
-        keep=FOURTH,
-    ),
-    Fact("torque at a quarter of the rate: NaN between", lambda: _quarter(np.nan), keep=FOURTH),
+    Fact("torque at a quarter of the rate: null between", quarter(None, object), keep=FOURTH),
+    Fact("torque at a quarter of the rate: NaN between", quarter(np.nan), keep=FOURTH),
     Fact(
         "torque at a quarter of the rate: held",
-        lambda: base(
-            tau1=TA[0][np.arange(N) // 4 * 4],
-            tau2=TA[1][np.arange(N) // 4 * 4],
-        ),
-        lambda: messages(lambda row: {"effort": TA[:, row - row % 4]}),
+        base(tau=HELD),
+        messages(effort=HELD),
         says_other=True,
     ),
     Fact("torque at a quarter of the rate: own stamps t_tau", file=own_stamps, within=0.2),
     Fact(
         "stamps of torque in a column t_tau, 50 ms late",
-        lambda: base(time_tau=T + 0.05),
+        base(time_tau=T + 0.05),
         ways=(*[way for way in FLAT if way != "arrays"], "json"),
         says_other=True,
     ),
     Fact(
         "effort on a topic of its own, ends early",
-        states=effort_elsewhere,
+        states=effort_elsewhere(),
         options={
             "topic": "/q",
             "tau1": {"topic": "/tau", "source": "effort[j1]"},
@@ -1049,13 +932,14 @@ FACTS = (
     ),
     Fact(
         "two topics of joint states, two arms",
-        states=lambda: [
+        states=[
             one
-            for row in ROWS
-            for one in (
-                message(row, topic="/a/joint_states"),
-                message(row, **other_arm(row), topic="/b/joint_states"),
+            for both in zip(
+                messages(topic="/a/joint_states"),
+                messages(**OTHER_ARM, topic="/b/joint_states"),
+                strict=True,
             )
+            for one in both
         ],
         says_other=True,
     ),
@@ -1063,14 +947,18 @@ FACTS = (
     Fact("a column's name twice (tau1, other values)", file=column_twice, says_other=True),
     Fact(
         "TAU1 beside tau1 (case)",
-        lambda: base(TAU1=np.full(N, 5.0), TAU2=np.full(N, 6.0)),
+        base(TAU1=np.full(N, 5.0), TAU2=np.full(N, 6.0)),
         says_other=True,
     ),
-    Fact("comment midway '# tau1, tau2 in mNm'", file=comment_midway, says_other=True),
-    Fact("comment behind the header '# tau1, tau2 in mNm'", file=comment_behind_header),
-    Fact("UTF-8 with BOM", file=encoded("utf-8-sig", ("csv", "tsv", "jsonl"))),
-    Fact("UTF-16", file=encoded("utf-16", ("csv", "tsv", "jsonl"))),
-    Fact("Latin-1, 't [µs]'", file=encoded("latin-1", _TEXT, _clocks("t [µs]", NS / 1e3))),
+    Fact(
+        "comment midway '# tau1, tau2 in mNm'",
+        file=commented(HALF + 1, np.where(FIRST_HALF, TA, MNM)),
+        says_other=True,
+    ),
+    Fact("comment behind the header '# tau1, tau2 in mNm'", file=commented(1, MNM)),
+    Fact("UTF-8 with BOM", file=encoded("utf-8-sig", (*_TEXT, "jsonl"), base())),
+    Fact("UTF-16", file=encoded("utf-16", (*_TEXT, "jsonl"), base())),
+    Fact("Latin-1, 't [µs]'", file=encoded("latin-1", _TEXT, clock("t [µs]", NS / 1e3))),
     *(
         Fact(f"packed {suffix}", file=packed(suffix, pack), within=1e-8)
         for suffix, pack in PACKED.items()
@@ -1094,8 +982,8 @@ def of_messages(way: str, folder: Path) -> Any:
 def _caller(
     label: str,
     options: Mapping[str, Any],
-    flat: Callable[[], dict[str, Any]] | None = base,
-    states: Callable[[], list[Message]] | None = messages,
+    flat: Columns | None = base(),  # noqa: B008
+    states: list[Message] | None = messages(),  # noqa: B008
     **expected: Any,
 ) -> Fact:
     """What a caller states of a log of columns, of messages, or of both."""
@@ -1111,14 +999,14 @@ CALLERS = (
     _caller(
         "time_unit=ms over a bracket [s]",
         {"time_unit": "ms"},
-        flat=lambda: renamed(base(), time="time [s]"),
+        flat=clock("time [s]", T),
         states=None,
         says_other=True,
     ),
     _caller(
         "time_unit=ms over dates",
         {"time_unit": "ms"},
-        flat=_clocks("time", (EPOCH + NS).astype("datetime64[ns]")),
+        flat=base(time=DATES),
         states=None,
         says_other=True,
     ),
@@ -1137,8 +1025,8 @@ CALLERS = (
     _caller(
         "torque unit mNm",
         {"tau1": {"unit": "mNm"}, "tau2": {"unit": "mNm"}},
-        flat=in_mnm,
-        states=lambda: effort(1e3),
+        flat=IN_MNM,
+        states=messages(effort=MNM),
         within=1e-8,
     ),
     _caller(
