@@ -34,6 +34,21 @@ LOG = noise_log(120, start_ns=EPOCH_NS)
 LONG = noise_log(2000, start_ns=EPOCH_NS)
 PLAIN = CompressionType.NONE
 Records = list[McapRecord]
+Edit = Callable[[Records], Records]
+
+
+def made(path: Path, log: Log = LONG, **options: Any) -> bytes:
+    """A file of a log, by default in several chunks with indexes, statistics and a summary."""
+    write_mcap(path, messages_of(log), **options)
+    return path.read_bytes()
+
+
+def beginning(path: Path, content: bytes, log: Log = LONG) -> Log:
+    """What is read of the content, which is how a log begins."""
+    path.write_bytes(content)
+    found = read_log(path)
+    assert same(found, log.part(0, len(found)))
+    return found
 
 
 def lost(found: Log) -> dict[str, str]:
@@ -47,18 +62,20 @@ def poked(content: bytes, place: int, kind: str, *values: int) -> bytes:
     return bytes(changed)
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """A log in several chunks with message indexes, statistics and a summary."""
-    path = tmp_path_factory.mktemp("whole") / "log.mcap"
-    write_mcap(path, messages_of(LOG), chunk_size=4096)
-    assert len(chunks_of(path)) > 3
-    return path.read_bytes()
+def flipped(content: bytes, value: float) -> bytes:
+    """The content with a bit of a number turned over."""
+    place = content.index(struct.pack("<d", value))
+    return poked(content, place, "<B", content[place] ^ 1)
 
 
-def summarised(content: bytes, edit: Callable[[Records], Records], checksum: bool = True) -> bytes:
+def summary_of(content: bytes) -> int:
+    """Where the summary begins."""
+    return int(struct.unpack_from("<Q", content, len(content) - 28)[0])
+
+
+def summarised(content: bytes, edit: Edit, checksum: bool = True) -> bytes:
     """The file with another summary under a checksum that is right for it, or none."""
-    start, _, _ = struct.unpack_from("<QQI", content, len(content) - 28)
+    start = summary_of(content)
     records = list(StreamReader(BytesIO(content[start:]), skip_magic=True).records)
     builder = RecordBuilder()
     for record in edit(
@@ -71,7 +88,7 @@ def summarised(content: bytes, edit: Callable[[Records], Records], checksum: boo
     return content[:start] + body + head + struct.pack("<I", crc) + content[-8:]
 
 
-def changing(kind: type, change: Callable[[Any], object]) -> Callable[[Records], Records]:
+def changing(kind: type, change: Callable[[Any], object]) -> Edit:
     """Changes the first record of a kind."""
 
     def edit(records: Records) -> Records:
@@ -81,11 +98,11 @@ def changing(kind: type, change: Callable[[Any], object]) -> Callable[[Records],
     return edit
 
 
-def without(*kinds: type) -> Callable[[Records], Records]:
+def without(*kinds: type) -> Edit:
     return lambda records: [one for one in records if not isinstance(one, kinds)]
 
 
-def redefined(kind: type, **change: Any) -> Callable[[Records], Records]:
+def redefined(kind: type, **change: Any) -> Edit:
     """A record of a kind stands there twice, and not the same."""
 
     def edit(records: Records) -> Records:
@@ -95,51 +112,45 @@ def redefined(kind: type, **change: Any) -> Callable[[Records], Records]:
     return edit
 
 
-WRONG: dict[str, Callable[[Records], Records]] = {
-    "a count of another channel": changing(
-        Statistics, lambda one: one.channel_message_counts.update({7: 1})
+TWICE = "defined anew and differently"
+SUMMARIES: dict[str, tuple[Edit, str]] = {
+    "as it was": (list, ""),
+    "a schema twice, alike": (redefined(Schema), ""),
+    "a channel twice, alike": (redefined(Channel), ""),
+    "no list of chunks": (without(ChunkIndex), ""),
+    "no statistics": (without(Statistics), "DAMAGED_INDEX"),
+    "nothing": (without(Statistics, ChunkIndex, Channel, Schema), "DAMAGED_INDEX"),
+    "a count of another channel": (
+        changing(Statistics, lambda one: one.channel_message_counts.update({7: 1})),
+        "DAMAGED_INDEX",
     ),
-    "a channel without definition": changing(Channel, lambda one: setattr(one, "id", 5)),
-    "a schema twice": redefined(Schema, data=b"int8 x"),
-    "a channel twice": redefined(Channel, topic="/other"),
+    "a channel without definition": (
+        changing(Channel, lambda one: setattr(one, "id", 5)),
+        "DAMAGED_INDEX",
+    ),
+    "a schema twice": (redefined(Schema, data=b"int8 x"), TWICE),
+    "a channel twice": (redefined(Channel, topic="/other"), TWICE),
 }
 
 
 @pytest.mark.parametrize("checksum", [True, False])
-@pytest.mark.parametrize("fault", WRONG)
+@pytest.mark.parametrize("summary", SUMMARIES)
 def test_a_summary_that_does_not_agree_with_the_file_loses_nothing_unseen(
-    fault: str, checksum: bool, whole: bytes, tmp_path: Path
+    summary: str, checksum: bool, tmp_path: Path
 ) -> None:
-    path = tmp_path / "log.mcap"
-    path.write_bytes(summarised(whole, WRONG[fault], checksum))
-    if fault.endswith("twice"):
-        with pytest.raises(LogError, match="defined anew and differently"):
+    path, (edit, told) = tmp_path / "log.mcap", SUMMARIES[summary]
+    path.write_bytes(summarised(made(path, LOG), edit, checksum))
+    if told == TWICE:
+        with pytest.raises(LogError, match=told):
             read_log(path)
         return
     found = read_log(path)
     assert same(found, LOG)
-    assert "DAMAGED_INDEX" in {notice.code for notice in found.notices}
-
-
-@pytest.mark.parametrize(
-    ("edit", "codes"),
-    [
-        (lambda records: records, []),
-        (redefined(Schema), []),
-        (redefined(Channel), []),
-        (without(Statistics), ["DAMAGED_INDEX"]),
-        (without(ChunkIndex), []),
-        (without(Statistics, ChunkIndex, Channel, Schema), ["DAMAGED_INDEX"]),
-    ],
-)
-def test_a_summary_that_agrees_is_used_and_one_that_says_too_little_is_no_damage(
-    edit: Callable[[Records], Records], codes: list[str], whole: bytes, tmp_path: Path
-) -> None:
-    path = tmp_path / "log.mcap"
-    path.write_bytes(summarised(whole, edit))
-    found = read_log(path)
-    assert same(found, LOG)
-    assert [notice.code for notice in found.notices] == codes
+    codes = {notice.code for notice in found.notices}
+    if summary == "a channel without definition":
+        assert told in codes
+    else:
+        assert codes == ({told} if told else set())
 
 
 @pytest.mark.parametrize(
@@ -153,17 +164,18 @@ def test_a_summary_that_agrees_is_used_and_one_that_says_too_little_is_no_damage
     ],
 )
 def test_a_damaged_footer_is_told_and_the_file_is_walked(
-    damage: Callable[[bytes], bytes], whole: bytes, tmp_path: Path
+    damage: Callable[[bytes], bytes], tmp_path: Path
 ) -> None:
     path = tmp_path / "log.mcap"
-    path.write_bytes(damage(whole))
+    path.write_bytes(damage(made(path, LOG)))
     found = read_log(path)
     assert same(found, LOG)
     assert [(one.code, one.case) for one in found.notices] == [("DAMAGED_INDEX", "summary")]
 
 
-def test_two_files_behind_one_another_are_not_one(whole: bytes, tmp_path: Path) -> None:
+def test_two_files_behind_one_another_are_not_one(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
+    whole = made(path, LOG)
     path.write_bytes(whole + whole)
     found = read_log(path)
     assert same(found, LOG)
@@ -176,36 +188,30 @@ def test_an_end_of_the_data_that_stands_too_early_hides_no_loss(
     chunked: bool, tail: bytes, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.mcap"
-    write_mcap(path, messages_of(LONG), use_chunking=chunked)
-    content = path.read_bytes()
-    start, _, _ = struct.unpack_from("<QQI", content, len(content) - 28)
+    content = made(path, use_chunking=chunked)
+    start = summary_of(content)
     end = content[start - 13 : start]
     assert end[0] == 15
     message = struct.pack("<BQ", 5, 22 + len(messages_of(LONG)[0][2]))
     first, place = content.find(message), content.rfind(message)
     if chunked:
         first, place = (chunks_of(path)[number].chunk_start_offset for number in (0, 3))
-    path.write_bytes(content[:first] + end + content[first:start] + tail)
-    assert same(read_log(path), LONG)  # all of it, but for the summary
-    content = poked(content, place + 1, "<Q", 3)
-    path.write_bytes(content[:first] + end + content[first:start] + tail)
-    found = read_log(path)
-    assert same(found, LONG.part(0, len(found)))
+    # all of it, but for the summary
+    whole = content[:first] + end + content[first:start] + tail
+    assert len(beginning(path, whole)) == len(LONG)
+    found = beginning(path, poked(whole, place + len(end) + 1, "<Q", 3))
     assert len(found) < len(LONG)
     assert lost(found).keys() & {"DAMAGED", "CUT_OFF"}
 
 
-def test_what_the_statistics_promise_and_a_walk_does_not_find_is_told(
-    whole: bytes, tmp_path: Path
-) -> None:
+def test_what_the_statistics_promise_and_a_walk_does_not_find_is_told(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
-    path.write_bytes(whole)
+    whole = made(path, LOG)
     chunk = chunks_of(path)[1]
     start = chunk.chunk_start_offset
     end = start + chunk.chunk_length + chunk.message_index_length
-    summary, _ = struct.unpack_from("<QQ", whole, len(whole) - 28)
     unlisted = summarised(whole, without(ChunkIndex), checksum=False)
-    unlisted = poked(unlisted, len(unlisted) - 28, "<Q", summary - (end - start))
+    unlisted = poked(unlisted, len(unlisted) - 28, "<Q", summary_of(whole) - (end - start))
     path.write_bytes(unlisted[:start] + unlisted[end:])
     found = read_log(path)
     assert 0 < len(found) < len(LOG)
@@ -214,41 +220,29 @@ def test_what_the_statistics_promise_and_a_walk_does_not_find_is_told(
 
 def test_a_file_cut_between_two_records_is_called_cut(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
-    write_mcap(path, messages_of(LONG))
-    path.write_bytes(path.read_bytes()[: chunks_of(path)[5].chunk_start_offset])
-    found = read_log(path)
-    assert same(found, LONG.part(0, len(found)))
+    content = made(path)
+    found = beginning(path, content[: chunks_of(path)[5].chunk_start_offset])
     assert lost(found) == {"CUT_OFF": "the file breaks off behind its last whole record"}
 
 
-@pytest.fixture(scope="module")
-def long() -> tuple[Log, list[tuple[str, int, bytes]]]:
-    """Twenty thousand samples and their messages: about 3 MB, many blocks of zstd and lz4."""
-    log = noise_log(20_000, start_ns=EPOCH_NS)
-    return log, messages_of(log)
+VERY_LONG = noise_log(20_000, start_ns=EPOCH_NS)
+"""About 3 MB of messages, many blocks of zstd and lz4."""
 
 
 @pytest.mark.parametrize("compression", list(CompressionType))
-@pytest.mark.parametrize("options", [{}, {"enable_crcs": False}])
+@pytest.mark.parametrize("checksums", [True, False])
 def test_a_chunk_that_breaks_off_yields_its_whole_messages(
-    compression: CompressionType,
-    options: dict[str, Any],
-    long: tuple[Log, list[tuple[str, int, bytes]]],
-    tmp_path: Path,
+    compression: CompressionType, checksums: bool, tmp_path: Path
 ) -> None:
-    log, messages = long
-    write_mcap(
-        tmp_path / "whole.mcap", messages, compression=compression, chunk_size=1 << 24, **options
+    path = tmp_path / "log.mcap"
+    content = made(
+        path, VERY_LONG, compression=compression, chunk_size=1 << 24, enable_crcs=checksums
     )
-    content = (tmp_path / "whole.mcap").read_bytes()
-    (chunk,) = chunks_of(tmp_path / "whole.mcap")
-    (tmp_path / "cut.mcap").write_bytes(
-        content[: chunk.chunk_start_offset + chunk.chunk_length * 6 // 10]
-    )
-    found = read_log(tmp_path / "cut.mcap")
+    (chunk,) = chunks_of(path)
+    cut = content[: chunk.chunk_start_offset + chunk.chunk_length * 6 // 10]
+    found = beginning(path, cut, VERY_LONG)
     # zstd and lz4 lose the block that breaks off, 128 and 64 KiB of about 3 MB
-    assert 0.53 < len(found) / len(log) < 0.61
-    assert same(found, log.part(0, len(found)))
+    assert 0.53 < len(found) / len(VERY_LONG) < 0.61
     assert lost(found).keys() == {"CUT_OFF"}
     assert "an unfinished chunk" in lost(found)["CUT_OFF"]
 
@@ -260,8 +254,7 @@ def test_a_file_is_read_up_to_its_first_broken_record(
 ) -> None:
     path = tmp_path / "log.mcap"
     options: dict[str, Any] = {"compression": PLAIN} if chunked else NO_INDEX
-    write_mcap(path, messages_of(LONG), use_chunking=chunked, **options)
-    content = path.read_bytes()
+    content = made(path, use_chunking=chunked, **options)
     if chunked:
         place = chunks_of(path)[len(chunks_of(path)) // 2].chunk_start_offset
         content = content[:-8] + b"no magic"
@@ -269,9 +262,7 @@ def test_a_file_is_read_up_to_its_first_broken_record(
         size = len(messages_of(LONG)[1000][2])
         before = content.index(struct.pack("<d", LONG.theta[0, 1000]))
         place = content.rindex(struct.pack("<BQ", 5, 22 + size), 0, before)
-    path.write_bytes(poked(content, place + 1, "<Q", length))
-    found = read_log(path)
-    assert same(found, LONG.part(0, len(found)))
+    found = beginning(path, poked(content, place + 1, "<Q", length))
     # a chunk that claims more bytes than the file has is torn, and whole
     assert 960 < len(found) < 1040
     told = lost(found)
@@ -282,28 +273,27 @@ def test_a_file_is_read_up_to_its_first_broken_record(
     ) or length in (0, 3)
 
 
-def test_a_flipped_bit_costs_its_chunk_and_is_told(tmp_path: Path) -> None:
-    for statistics in (True, False):  # without, the chunk's own index tells how many are lost
-        path = tmp_path / "log.mcap"
-        write_mcap(path, messages_of(LONG), compression=PLAIN, use_statistics=statistics)
-        content = bytearray(path.read_bytes())
-        content[content.index(struct.pack("<d", LONG.theta[0, 1000]))] ^= 1
-        path.write_bytes(content)
-        found = read_log(path)
-        assert len(found) > 1900
-        assert LONG.theta[0, 1000] not in found.theta
-        assert lost(found).keys() == {"DAMAGED"}
-        missing = f"{len(LONG) - len(found):,} messages are missing"
-        assert missing in lost(found)["DAMAGED"]
+@pytest.mark.parametrize("statistics", [True, False])
+def test_a_flipped_bit_costs_its_chunk_and_is_told(statistics: bool, tmp_path: Path) -> None:
+    """Without statistics, the chunk's own index tells how many are lost."""
+    path, value = tmp_path / "log.mcap", LONG.theta[0, 1000]
+    content = made(path, compression=PLAIN, use_statistics=statistics)
+    path.write_bytes(flipped(content, value))
+    found = read_log(path)
+    assert len(found) > 1900
+    assert value not in found.theta
+    assert lost(found).keys() == {"DAMAGED"}
+    missing = f"{len(LONG) - len(found):,} messages are missing"
+    assert missing in lost(found)["DAMAGED"]
 
 
 @pytest.mark.parametrize(("place", "value"), [(23, 31), (23, 1 << 40), (23, -8), (9, 7)])
 def test_a_message_index_that_lies_is_not_believed(place: int, value: int, tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
-    write_mcap(path, messages_of(LONG), compression=PLAIN, chunk_size=1 << 15)
+    content = made(path, compression=PLAIN, chunk_size=1 << 15)
     (index,) = chunks_of(path)[0].message_index_offsets.values()
     # the offset of the first message, or the channel
-    path.write_bytes(poked(path.read_bytes(), index + place, "<h" if place == 9 else "<q", value))
+    path.write_bytes(poked(content, index + place, "<h" if place == 9 else "<q", value))
     found = read_log(path)
     if place == 9:  # the chunk is taken for one of another channel's
         assert lost(found).keys() == {"DAMAGED"}
@@ -314,22 +304,19 @@ def test_a_message_index_that_lies_is_not_believed(place: int, value: int, tmp_p
 
 def test_a_file_of_which_damage_left_nothing_says_so_and_where(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
-    write_mcap(path, messages_of(LOG), compression=PLAIN, chunk_size=1 << 20)
-    whole = path.read_bytes()
+    whole = made(path, LOG, compression=PLAIN, chunk_size=1 << 20)
     (chunk,) = chunks_of(path)
-    content = bytearray(whole)
-    content[content.index(struct.pack("<d", LOG.theta[0, 50]))] ^= 1
-    path.write_bytes(content)
     place = chunk.chunk_start_offset
-    with pytest.raises(LogError, match=rf"damaged \(.*checksum.*byte {place}\).*no topic"):
-        read_log(path)
-    content[content.rindex(b"JointState")] ^= 1  # in the summary
-    path.write_bytes(content)
-    with pytest.raises(LogError, match=r"damaged \(its summary: its checksum is wrong; .*no topic"):
-        read_log(path)
-    path.write_bytes(whole[: place + 100])
-    with pytest.raises(LogError, match=rf"damaged \(.*breaks off at byte {place}.*no topic"):
-        read_log(path)
+    broken = flipped(whole, LOG.theta[0, 50])
+    name = broken.rindex(b"JointState")  # in the summary
+    for content, words in (
+        (broken, rf".*checksum.*byte {place}\)"),
+        (poked(broken, name, "<B", broken[name] ^ 1), "its summary: its checksum is wrong; "),
+        (whole[: place + 100], f".*breaks off at byte {place}"),
+    ):
+        path.write_bytes(content)
+        with pytest.raises(LogError, match=rf"damaged \({words}.*no topic"):
+            read_log(path)
 
 
 def test_the_truth_in_the_metadata_is_read_where_it_can_be(tmp_path: Path) -> None:
@@ -356,10 +343,9 @@ def test_a_chunk_that_holds_more_than_it_claims_is_lost_and_told(
     packed: CompressionType, claimed: int, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.mcap"
-    write_mcap(path, messages_of(LOG), chunk_size=4096, compression=packed)
-    first = chunks_of(path)[0]
-    size_at = first.chunk_start_offset + 9 + 16
-    path.write_bytes(poked(path.read_bytes(), size_at, "<QI", claimed, 0))  # and no checksum
+    content = made(path, LOG, compression=packed)
+    size_at = chunks_of(path)[0].chunk_start_offset + 9 + 16
+    path.write_bytes(poked(content, size_at, "<QI", claimed, 0))  # and no checksum
     found = read_log(path)
     assert 0 < len(found) < len(LOG)
     assert "a chunk's size or its checksum is wrong" in lost(found)["DAMAGED"]

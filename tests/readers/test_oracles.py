@@ -113,16 +113,6 @@ def array(_stamp: int, values: Sequence[float], draw: np.random.Generator) -> An
     )
 
 
-def wrench(stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
-    """A force and a torque."""
-    kind = "geometry_msgs/msg/Vector3"
-    force, torque = (
-        made(kind, x=pair[0], y=pair[1], z=draw.normal()) for pair in (values[:2], values[2:])
-    )
-    both = made("geometry_msgs/msg/Wrench", force=force, torque=torque)
-    return made("geometry_msgs/msg/WrenchStamped", header=header(stamp, "tool"), wrench=both)
-
-
 def custom(_stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
     """Numbers of every width in every place."""
 
@@ -164,14 +154,12 @@ class Kind:
 
 
 JOINTS = {"joints": ["shoulder", "elbow"]}
-WRENCH = ("wrench.force.x", "wrench.force.y", "wrench.torque.x", "wrench.torque.y")
 STATE = ("joints[0].angle", "joints[1].angle", "joints[0].torques[1]", "joints[1].torques[1]")
 ARRAY = ("data[1]", "data[2]", "data[3]", "data[4]")
 KINDS = (
     Kind("sensor_msgs/msg/JointState", joint_state, JOINTS),
     Kind("control_msgs/msg/DynamicJointState", dynamic, JOINTS),
     Kind("std_msgs/msg/Float64MultiArray", array, indexed(*ARRAY)),
-    Kind("geometry_msgs/msg/WrenchStamped", wrench, indexed(*WRENCH)),
     Kind("lab/msg/State", custom, indexed(*STATE)),
 )
 

@@ -1,4 +1,4 @@
-"""How much memory long tables take, read in blocks as identification reads them."""
+"""How much memory long logs take, read in blocks as identification reads them."""
 
 from __future__ import annotations
 
@@ -11,15 +11,22 @@ import pyarrow as pa
 import pyarrow.feather as feather
 import pyarrow.parquet as pq
 import pytest
+import zstandard
 from scipy.io import savemat
 
 from algid.arm import FloatArray
+from tests.readers.large import WRITERS as MESSAGES
 from tests.readers.large import peak_of_reading
 
 MOST_BYTES = 600e6
 """What reading 1e7 samples may take."""
 MOST_PACKED = 420e6
 """Of 4e6 samples: blocks in hand and their arrays once, 160 MB, beside 100 MB of the program."""
+MOST_MESSAGES = 160e6
+"""Of 1.5e6 messages: the samples' arrays alone take 60 MB, beside some 60 MB of a program that
+reads nothing."""
+INDEXED = 200
+"""Bytes a message that rosbags takes for the index of a ROS 1 bag."""
 ROW = 50  # bytes of a row of text, which polars unpacks whole where it is packed
 
 Columns = dict[str, FloatArray]
@@ -31,7 +38,9 @@ def _packed_npz(path: Path, columns: Columns) -> None:
 
 WRITERS: dict[str, Callable[[Path, Columns], object]] = {
     "csv": lambda path, columns: pl.DataFrame(columns).write_csv(path, float_precision=6),
-    "csv.zst": lambda path, columns: path.write_bytes(_packed(columns)),
+    "csv.zst": lambda path, columns: path.write_bytes(
+        zstandard.compress(pl.DataFrame(columns).write_csv(float_precision=6).encode(), 1)
+    ),
     "parquet": lambda path, columns: pq.write_table(pa.table(columns), path),
     "feather": lambda path, columns: feather.write_feather(pa.table(columns), str(path)),
     "one.feather": lambda path, columns: pl.DataFrame(columns).write_ipc(path),
@@ -40,12 +49,6 @@ WRITERS: dict[str, Callable[[Path, Columns], object]] = {
     "mat": lambda path, columns: savemat(path, columns),
     "packed.mat": lambda path, columns: savemat(path, columns, do_compression=True),
 }
-
-
-def _packed(columns: Columns) -> bytes:
-    import zstandard
-
-    return zstandard.compress(pl.DataFrame(columns).write_csv(float_precision=6).encode(), 1)
 
 
 def _write(path: Path, kind: str, rows: int) -> None:
@@ -61,20 +64,30 @@ def _write(path: Path, kind: str, rows: int) -> None:
     WRITERS[kind](path, columns)
 
 
+def _size(kind: str) -> tuple[int, float]:
+    """Samples of a log, and the most bytes that reading it may take."""
+    if kind in MESSAGES:
+        samples = 1_500_000
+        return samples, MOST_MESSAGES + INDEXED * samples * (kind == "bag")
+    if kind.startswith("packed") or kind.endswith(".zst"):  # which takes long to make
+        samples = 4_000_000
+        return samples, MOST_PACKED + ROW * samples * (kind == "csv.zst")
+    return 10_000_000, MOST_BYTES
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(
     not Path("/proc/self/status").exists(), reason="the system does not tell a program's peak"
 )
-@pytest.mark.parametrize("kind", WRITERS)
-def test_long_tables_are_read_in_bounded_memory(kind: str, tmp_path: Path) -> None:
-    samples, most = 10_000_000, MOST_BYTES
-    if kind.startswith("packed") or kind.endswith(".zst"):  # which takes long to make
-        samples, most = 4_000_000, MOST_PACKED
-    if kind == "csv.zst":
-        most += ROW * samples
+@pytest.mark.parametrize("kind", [*WRITERS, *MESSAGES])
+def test_long_logs_are_read_in_bounded_memory(kind: str, tmp_path: Path) -> None:
+    samples, most = _size(kind)
     path = tmp_path / f"log.{kind}"
     try:
-        _write(path, kind, samples)
+        if kind in MESSAGES:
+            MESSAGES[kind](path, samples)
+        else:
+            _write(path, kind, samples)
         rows, peak = peak_of_reading(path)
     finally:
         path.unlink(missing_ok=True)
