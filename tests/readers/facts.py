@@ -150,8 +150,9 @@ def messages(where: Any = ROWS >= 0, **changes: Any) -> list[Message]:
             name: value[..., row] if isinstance(value, np.ndarray) else value
             for name, value in (own | changes if where[row] else own).items()
         }
-        own["stamp"] = int(own["stamp"])
-        own["log_stamp"] = int(own.get("log_stamp", own["stamp"]))
+        own = {"log_stamp": own["stamp"], **own}
+        for name in ("stamp", "log_stamp"):
+            own[name] = int(own[name])
         for name in {"position", "effort", "velocity"} & own.keys():
             own[name] = tuple(map(float, own[name]))
         found.append(Message(**own))
@@ -368,7 +369,7 @@ def own_stamps(way: str, folder: Path) -> Any:
 def effort_elsewhere() -> list[Message]:
     """Torques on a topic of their own, which ends early."""
     both = zip(messages(effort=(), topic="/q"), messages(position=(), topic="/tau"), strict=True)
-    found = []
+    found = list[Message]()
     for row, sent in enumerate(both):
         found += sent if row < 0.7 * N else sent[:1]
     return found

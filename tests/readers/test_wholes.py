@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import sys
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import scipy.io
@@ -24,61 +25,47 @@ assert LOG.omega is not None
 OMEGA = LOG.omega
 
 
-def lines(path: Path, rows: list[dict[str, Any]]) -> Path:
-    path.write_text("".join(json.dumps(row) + "\n" for row in rows))
-    return path
-
-
-def nested() -> list[dict[str, Any]]:
-    """A line a sample, as a driver of motors writes them."""
-    return [
-        {
-            "t": LOG.t[row],
-            "mode": "run",
-            "motor_state": [
-                {"q": LOG.theta[one, row], "dq": OMEGA[one, row], "tau_est": LOG.tau[one, row]}
-                for one in (0, 1)
-            ],
-        }
-        for row in range(len(LOG))
-    ]
+def lines(folder: Path, row: int = 0, change: Callable[[str], str] = str) -> Path:
+    """A line a sample, as a driver of motors writes them, one of them changed."""
+    kept = []
+    for t, theta, omega, tau in zip(LOG.t, LOG.theta.T, OMEGA.T, LOG.tau.T, strict=True):
+        joints = [
+            {"q": q, "dq": dq, "tau_est": torque}
+            for q, dq, torque in zip(theta, omega, tau, strict=True)
+        ]
+        kept.append(json.dumps({"t": t, "mode": "run", "motor_state": joints}))
+    kept[row] = change(kept[row])
+    (folder / "a.jsonl").write_text("\n".join(kept))
+    return folder / "a.jsonl"
 
 
 @pytest.mark.parametrize(
     "wrong", ['{"t": 1, "motor_state": [', "[1, 2]", "nan", '{"t": 1,}', '{"t": NaN}']
 )
 def test_a_line_that_is_no_object_is_refused_with_its_number(wrong: str, tmp_path: Path) -> None:
-    path = lines(tmp_path / "a.jsonl", nested())
-    kept = path.read_text().splitlines()
-    kept[30] = wrong
-    path.write_text("\n".join(kept))
+    path = lines(tmp_path, 30, lambda _: wrong)
     with pytest.raises(LogError, match=r"a\.jsonl: line 31: expected a JSON object in every line"):
         read_log(path)
 
 
 @pytest.mark.parametrize("left", [1, 30, -1])
 def test_a_last_line_that_breaks_off_is_dropped_and_counted(left: int, tmp_path: Path) -> None:
-    path = lines(tmp_path / "a.jsonl", nested())
-    whole = path.read_text().rstrip("\n")
-    last = whole.rpartition("\n")[2]
-    path.write_text(whole.removesuffix(last) + last[:left])
-    log = read_log(path)
+    log = read_log(lines(tmp_path, -1, lambda line: line[:left]))
     assert np.array_equal(log.theta, LOG.theta[:, :59])
     (notice,) = (notice for notice in log.notices if notice.lossy)
     assert notice.code == "CUT_OFF"
     assert notice.text == "the last row, row 60, breaks off and was dropped"
 
 
-@pytest.mark.parametrize("opened", ["[", '{"a":'])
-def test_lines_that_lie_deep_within_themselves_are_refused(opened: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("opened", "closed"), [("[", "]"), ('{"a":', "}")])
+def test_lines_that_lie_deep_within_themselves_are_refused(
+    opened: str, closed: str, tmp_path: Path
+) -> None:
     """polars takes minutes for a thousand lists within one another."""
-    closed = {"[": "]", '{"a":': "}"}[opened]
-    for depth, refused in ((7, False), (8, True), (1000, True), (100_000, True)):
-        path = lines(tmp_path / "a.jsonl", nested())
-        kept = path.read_text().splitlines()
-        kept[30] = kept[30][:-1] + ', "x": ' + opened * depth + "1" + closed * depth + "}"
-        path.write_text("\n".join(kept))
-        if refused:
+    for depth in (7, 8, 1000, 100_000):
+        nested = f'"x": {opened * depth}1{closed * depth}'
+        path = lines(tmp_path, 30, lambda line, more=nested: f"{line[:-1]}, {more}}}")  # type: ignore[misc]
+        if depth > 7:
             with pytest.raises(LogError, match=r"a\.jsonl: lists and objects within"):
                 read_log(path)
         else:
@@ -100,9 +87,8 @@ def test_other_text_is_no_json_lines(text: str, tmp_path: Path) -> None:
     assert format_of(tmp_path / "a.jsonl").name == "csv"
 
 
-def written_hdf5(path: Path, userblock: int = 0) -> Path:
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(path, "w", userblock_size=userblock) as file:
+def written_hdf5(path: Path) -> Path:
+    with h5py.File(path, "w") as file:
         group = file.create_group("arm/state")
         group["q"], group["tau"] = LOG.theta.T, LOG.tau.T
         file["time"] = LOG.t
@@ -133,21 +119,16 @@ def test_hdf5_is_read_and_its_arrays_are_listed(tmp_path: Path) -> None:
 
 def test_matlab_7_3_is_hdf5_behind_a_head(tmp_path: Path) -> None:
     """MATLAB writes matrices by columns: two joints are two rows there."""
-    h5py = pytest.importorskip("h5py")
     path = tmp_path / "a.mat"
     with h5py.File(path, "w", userblock_size=512) as file:
         file["q"], file["tau"], file["t"] = LOG.theta, LOG.tau, LOG.t[None, :]
         file.create_group("#refs#")["a"] = np.arange(1000.0)
-    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(116) + bytes(8) + struct_of_version()
+    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(116) + bytes(8) + b"\x00\x02IM"
     content = path.read_bytes()
     path.write_bytes(head + content[len(head) :])
     log = read_log(path)
     assert np.array_equal(log.theta, LOG.theta)
     assert np.array_equal(log.tau, LOG.tau)
-
-
-def struct_of_version() -> bytes:
-    return b"\x00\x02IM"
 
 
 def test_hdf5_without_its_package_says_what_to_install(
@@ -162,7 +143,6 @@ def test_hdf5_without_its_package_says_what_to_install(
 
 
 def test_hdf5_that_is_damaged_or_leads_elsewhere_is_refused(tmp_path: Path) -> None:
-    h5py = pytest.importorskip("h5py")
     path = written_hdf5(tmp_path / "a.h5")
     content = path.read_bytes()
     path.write_bytes(content[: len(content) // 2])
@@ -179,7 +159,6 @@ def test_hdf5_that_is_damaged_or_leads_elsewhere_is_refused(tmp_path: Path) -> N
 @pytest.mark.parametrize("chunks", [None, 30])
 def test_hdf5_of_which_a_part_is_missing_is_refused(tmp_path: Path, chunks: int | None) -> None:
     """HDF5 fills up with zeros what was never written; an array cut short keeps its bytes."""
-    h5py = pytest.importorskip("h5py")
     path = tmp_path / "a.h5"
     with h5py.File(path, "w") as file:
         for name, values in {"t": LOG.t, "q": LOG.theta.T}.items():
