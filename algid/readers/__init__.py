@@ -55,7 +55,7 @@ def _open_one(path: str | Path | FrameOrArrays, profile: Profile) -> TableReader
 
         found = open_file(Path(path), profile)
         if not isinstance(found, TableFile):
-            from algid.readers.messages.reader import offer_messages
+            from algid.readers.messages.offer import offer_messages
 
             return open_offered(offer_messages(found, profile), profile)
     else:

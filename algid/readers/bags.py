@@ -24,7 +24,7 @@ from algid.notices import Notice
 from algid.readers.flat import as_log_error
 from algid.readers.mcap import mcap_file
 from algid.readers.messages.message_file import MessageChannel, MessageFile, Messages
-from algid.readers.messages.reader import MessageLog
+from algid.readers.messages.offer import MessageLog
 
 _BATCH_BYTES, _BATCH_ROWS = 1 << 21, 1 << 14
 _NAME_AND_NUMBER = re.compile(r"(.*?)(?:_(\d+))?$")

@@ -19,7 +19,7 @@ from algid.readers.dialect import head_of, looks_like_text
 if TYPE_CHECKING:
     from algid.profile import Profile
     from algid.readers.messages.message_file import MessageFile
-    from algid.readers.messages.reader import MessageLog
+    from algid.readers.messages.offer import MessageLog
     from algid.readers.table_cells import TableFile
 
 _MOST_SHOWN = 64
@@ -214,7 +214,7 @@ def entries_of(opened: TableFile | MessageLog) -> Entries:
 
 
 def _topics(file: MessageFile) -> Iterator[Entry]:
-    from algid.readers.messages.joint_topic import fields_shown
+    from algid.readers.messages.offer import fields_shown
 
     first, last = file.span_ns or (0, 0)
     for place, (number, channel) in enumerate(sorted(file.channels.items())):

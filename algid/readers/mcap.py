@@ -39,7 +39,7 @@ from algid.readers.messages.message_file import (
     Messages,
     gather,
 )
-from algid.readers.messages.reader import MessageLog
+from algid.readers.messages.offer import MessageLog
 
 _FRAME = struct.Struct("<BQ")
 _INDEX = struct.Struct("<BQHI")

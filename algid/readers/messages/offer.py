@@ -1,23 +1,32 @@
-"""Choice of the topics and fields to read: by a profile, else by the first messages."""
+"""What a log of messages offers: topics and fields by a profile, else by the first messages."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from itertools import chain
-from typing import NamedTuple
 
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.text import repeated
-from algid.notices import Remedy
+from algid.notices import Notice, Remedy
 from algid.profile import Profile
+from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.column_names import STEMS, ChannelChoice, choose
 from algid.readers.messages.layout import MessageLayout, MisfitError
 from algid.readers.messages.message_file import MessageFile
-from algid.readers.messages.topic import codec_for
+from algid.readers.messages.topic import codec_for, topic_tables
 from algid.readers.stated import in_json_schema, lines_of, units_in
-from algid.readers.table import REFERENCES, TopicField
+from algid.readers.table import (
+    REFERENCES,
+    ROWS,
+    Clock,
+    Offered,
+    SampleTable,
+    TopicField,
+    in_pairs,
+)
 from algid.readers.table_cells import LABELS
 
 _SAMPLES = 64
@@ -35,19 +44,156 @@ _STAMPS = ("header.stamp", "stamp", "timestamp", "time", "header.timestamp")
 _PARTS = (("sec", "nanosec"), ("sec", "nsec"), ("seconds", "nanos"), ("secs", "nsecs"))
 
 
-class JointTopic(NamedTuple):
-    """A topic with joint states, what it offers, and the fields that are chosen of it.
+@dataclass(frozen=True)
+class MessageLog:
+    """A log of messages: what messages call it, its format, and what opens its files in order.
 
-    `beside` are other topics that hold two joints too.
+    Several passes go over a log: an opened file is kept.
     """
 
-    topic: str
-    fields: dict[str, TopicField]
-    choice: ChannelChoice
-    beside: tuple[str, ...] = ()
+    path: str
+    kind: str
+    files: Sequence[Callable[[], MessageFile]]
+    notices: tuple[Notice, ...] = ()
 
 
-def stated_of(
+def offer_messages(log: MessageLog, profile: Profile) -> Offered:
+    """The fields of the topics that a profile, or the messages themselves, choose.
+
+    Raises
+    ------
+    LogError
+        If no topic holds the joints, several do, or a message cannot be read.
+    """
+    file = log.files[0]()
+    given = {name: place for name in profile.channels if (place := profile.place(name))[1]}
+    # where each channel comes from: the topic with joint states, then what the profile names
+    fields, chosen = dict[str, TopicField](), dict[str, str]()
+    notices, home, joints = [*log.notices], None, None
+    if not set(profile.needed) <= given.keys() and (
+        found := _find_joint_topic(file, profile, given)
+    ):
+        home, fields, (columns, joints), beside = found
+        chosen = {name: one for name, one in columns.items() if name in profile.channels}
+        if beside:
+            numbers = {"case": "topic", "topic": home, "others": ", ".join(beside[:4])}
+            other = Remedy({"topic": beside[0]}, "for the other")
+            notices.append(Notice("JOINT_ORDER", numbers=numbers, remedies=(other,)))
+    named = dict[str, TopicField]()
+    own = [fields[chosen[name]].joint for name in ("theta1", "theta2") if name in chosen]
+    if len(own) == 2 and all(own) and given.keys().isdisjoint(REFERENCES):
+        named |= _references_of(file, own)
+    for name, (topic, path) in given.items():
+        if not (topic or home):
+            raise LogError(f"{file.path}: {name} is taken from {path!r} without a topic: {TOPIC}")
+        named[name] = TopicField(str(path), topic or home or "")
+    for name, one in named.items():
+        chosen[name] = f"{one.topic}/{one.column}/"  # a name in which nothing is a unit
+        fields[chosen[name]] = one
+    chosen = in_pairs(chosen, profile.velocity)
+    units, said = dict[str, str](), list[str]()
+    stamps = dict[str, tuple[str, str] | None]()
+    for home in dict.fromkeys(fields[one].topic for one in chosen.values()):
+        paths = {name: one.column for name, one in fields.items() if one.topic == home}
+        wanted = {name: fields[one].column for name, one in chosen.items() if one in paths}
+        layouts = list[MessageLayout]()
+        for layout in layouts_of(file, home):
+            layouts.append(layout)
+            if layout.has(wanted.values()) and stamp_in(layout):
+                break  # later messages tell nothing more
+        _refuse_absent(file, home, wanted, layouts)
+        stamps[home] = None
+        if profile.clock != "log":
+            stamps[home] = next(filter(None, map(stamp_in, layouts)), None)
+        if profile.clock == "header" and stamps[home] is None:
+            log_clock = Remedy({"clock": "log"})
+            raise LogError(f"{file.path}: messages on {home!r} carry no stamp: {log_clock}")
+        stated, lines = _stated_of(file, home, paths, layouts)
+        units |= stated
+        said += lines
+    # the main topic has the clock
+    main, stamp = next(iter(stamps.items()))
+    chosen["t"], time = "log time", TopicField("", is_clock=True)
+    if stamp:
+        chosen["t"] = stamp[0].rpartition(".")[0]
+        time = TopicField(chosen["t"], main, is_clock=True)
+    fields[chosen["t"]] = time
+
+    def tables(
+        sources: Mapping[str, str], _clock: Clock, told: list[Notice], most: int | None = None
+    ) -> Iterator[SampleTable]:
+        """The samples of the first topic, each with what the others have at its time.
+
+        Tables have at least `most` rows, but for the last. All stamps are in ns.
+
+        Raises
+        ------
+        LogError
+            If another topic has no sample.
+        """
+        homes: dict[str, dict[str, str]] = {}
+        for channel, source in sources.items():
+            if channel != "t":
+                homes.setdefault(fields[source].topic, {})[channel] = fields[source].column
+
+        def read(name: str, told: list[Notice]) -> Iterator[SampleTable]:
+            own = log.files, name, homes[name], stamps[name], profile.clock == "header" or None
+            return topic_tables(*own, told, most or ROWS)
+
+        main, *others = homes
+        samples = read(main, told)
+        if not others:
+            return samples
+        needed, followed = list[Series](), list[Series]()
+        for one in others:
+            only_followed = set(homes[one]) <= set(REFERENCES)
+            own = list[Notice]() if only_followed else told  # it may be missing
+            try:
+                series = whole_topic(log.path, one, homes[one], read(one, own), own)
+                (followed if only_followed else needed).append(series)
+            except LogError as error:
+                if not only_followed:
+                    raise
+                why = str(error).removeprefix(f"{log.path}: ")
+                numbers = {"case": "reference", "topic": one, "why": why}
+                told.append(Notice("MESSAGES_LEFT_OUT", numbers=numbers))
+        return aligned(in_order(log.path, samples, told), needed, told, followed)
+
+    clock = "header" if stamp else "log"
+    return Offered(
+        log.path,
+        log.kind,
+        fields,
+        chosen,
+        tables,
+        file.truth,
+        clock,
+        joints,
+        file.count(main),
+        units,
+        tuple(notices),
+        tuple(said),
+    )
+
+
+def _refuse_absent(
+    file: MessageFile, topic: str, paths: Mapping[str, str], layouts: Sequence[MessageLayout]
+) -> None:
+    """Raises `LogError` where none of the first messages has one of the paths by channel."""
+    if not layouts:
+        each = Remedy({"tau1.topic": None}, "for one channel")
+        text = f"there is no message on topic {topic!r}; found {file.listed()}; name another"
+        raise LogError(file.lacking(f"{text}: {TOPIC}; {each}"))
+    for channel, path in paths.items():
+        if not any(layout.find(path) for layout in layouts):
+            known = next((list(one.numbers)[:12] for one in layouts if one.numbers), ["nothing"])
+            raise LogError(
+                f"{file.path}: messages on {topic!r} have no {path!r} for {channel}; found "
+                f"{', '.join(known)}; {Remedy({f'{channel}.source': None}, 'name another')}"
+            )
+
+
+def _stated_of(
     file: MessageFile, topic: str, paths: Mapping[str, str], layouts: Sequence[MessageLayout]
 ) -> tuple[dict[str, str], list[str]]:
     """By field the unit that a topic's schema or metadata state; what else is stated, as text.
@@ -70,7 +216,7 @@ def stated_of(
     return {name: units[path] for name, path in lists.items() if path in units}, lines
 
 
-def references_of(file: MessageFile, joints: Sequence[str]) -> dict[str, TopicField]:
+def _references_of(file: MessageFile, joints: Sequence[str]) -> dict[str, TopicField]:
     """By reference channel the field of what joints follow, if one topic alone tells it."""
     found: list[list[TopicField]] = []
     for topic in file.topics:
@@ -88,19 +234,20 @@ def references_of(file: MessageFile, joints: Sequence[str]) -> dict[str, TopicFi
     return dict(zip(REFERENCES, found[0], strict=True)) if len(found) == 1 else {}
 
 
-def find_joint_topic(
+def _find_joint_topic(
     file: MessageFile, profile: Profile, given: Collection[str]
-) -> JointTopic | None:
-    """The one topic with joint states; None where there is none and a profile names the fields.
+) -> tuple[str, dict[str, TopicField], ChannelChoice, list[str]] | None:
+    """The one topic with joint states, its fields, those chosen, and other topics that hold two.
 
-    Of channels that are `given` it need not hold the fields.
+    None where there is none and a profile names the fields. Of channels that are `given` it need
+    not hold the fields.
 
     Raises
     ------
     LogError
         If none holds two joints, several do, or one holds more and none was selected.
     """
-    fitting: dict[str, JointTopic] = {}
+    fitting: dict[str, tuple[dict[str, TopicField], ChannelChoice]] = {}
     refused, lacking = list[str](), list[str]()
     needed = [name for name in profile.needed if name not in given]
     choose_two = Remedy({"joints": None}, "choose two")
@@ -125,7 +272,7 @@ def find_joint_topic(
                     why = f"{file.path}: {name!r}: {error}; {choose_two}; {by_place} …"
                     continue
                 if choice.columns.keys() >= set(needed):
-                    fitting[name] = JointTopic(name, fields, choice)
+                    fitting[name] = fields, choice
                     break
                 if names := names_in(layout):
                     held = f"{name!r} with {', '.join(list(_paths(layout, names))[:12])}"
@@ -135,8 +282,8 @@ def find_joint_topic(
             refused[:0] = [why] if why else []
             lacking += [held] if held else []
     if _USUAL in fitting or len(fitting) == 1:
-        found = fitting.pop(_USUAL, None) or fitting.popitem()[1]
-        return found._replace(beside=tuple(fitting))
+        topic = _USUAL if _USUAL in fitting else next(iter(fitting))
+        return topic, *fitting.pop(topic), list(fitting)
     if fitting:
         raise LogError(f"{file.path}: joint states on {', '.join(fitting)}; choose: {TOPIC}")
     for refusal in refused:
