@@ -129,6 +129,9 @@ TOLD: list[tuple[tuple[str, ...], Log, str]] = [
     ),
     (STUCK, logged(tau2=published(21)), ""),
     (STUCK, logged(tau2=published(50)), ""),
+    # a torque that stands at its largest or smallest value is at a limit
+    (STUCK, logged(tau2=np.where((T > 0.5) & (T < 0.9), 1.5, np.sin(40 * T))), ""),
+    (STUCK, logged(tau2=np.where((T > 0.5) & (T < 0.9), -1.5, np.sin(40 * T))), ""),
     (STUCK, logged(FROZEN), "theta2 freezes for 0.021 s from t = 0.6 s, then jumps"),
     (STUCK, logged(np.concatenate([FROZEN[:619], T[619:]])), ""),
     (STUCK, logged(RESTED), ""),  # it stood still, and went on as before
@@ -139,6 +142,7 @@ TOLD: list[tuple[tuple[str, ...], Log, str]] = [
     (ANGLES, logged(jumped(1), stamps=late(6)), ""),
     (ANGLES, logged(jumped(1), stamps=late(4)), "theta2 jumps by a turn 1 time"),
     (ANGLES, logged(jumped(0.89)), ""),
+    (ANGLES, logged(0.95 * TURN * np.arange(ROWS)), ""),  # so fast that no step tells a turn
     (ANGLES, logged(jumped(0.92)), "theta2 jumps by a turn 1 time"),
     (ANGLES, logged(jumped(1.08)), "theta2 jumps by a turn 1 time"),
     (ANGLES, logged(jumped(1.11)), ""),
@@ -159,12 +163,20 @@ TOLD: list[tuple[tuple[str, ...], Log, str]] = [
         "angles of joint 1 are in degrees by the other signal; they are taken for rad as configur",
     ),
     (SCALES, logged(5.9 / 6.1 * WIDE), ""),
+    # velocities agree with angles of many turns
+    (SCALES, logged(WIDE, omega=np.stack([np.cos(T), np.full(ROWS, WIDE[-1] / T[-1])])), ""),
     (
         SCALES,
         logged(WIDE, omega=np.zeros((2, ROWS))),  # velocities that say nothing are none
         "angles reach 38.33: few arms turn that far in rad",
     ),
     (SPIKES, logged(tau2=overshot()), ""),
+    (SPIKES, logged(tau2=np.where(T == 0.01, 9.0, np.cos(T))[:19]), ""),
+    (
+        ("UNEVEN_STAMPS:near",),
+        logged(stamps=T - 0.8e-3 * (np.arange(ROWS) % 100 == 50)),
+        "20 samples follow the one before by less than 0.3 of a period of 1 ms",
+    ),
     (
         SAMPLING,
         logged(np.sin(T), stamps=late(251, 500) + late(1501, 1200) - T),
@@ -315,6 +327,10 @@ def test_rest_lasts_until_a_thousandth_of_the_way(before: float, after: float, f
     found = of_codes(of_signals(log), "RESTS")
     assert [one.remedies[0].words for one in found] == [flags] * bool(flags)
     assert all(one.note for one in found)
+    begin = of_codes(examine(log, lambda: None, whole=False), "RESTS")  # its end is none
+    assert [one.remedies[0].words for one in begin] == [
+        word for word in [flags.partition(" --end")[0]] if word.startswith("--start")
+    ]
 
 
 def test_of_the_beginning_of_a_log_nothing_is_refused_and_the_place_is_told() -> None:

@@ -117,6 +117,11 @@ def test_encoders_and_rest_make_no_lost_samples() -> None:
         assert not has_code(of_signals(replace(log, theta=theta)), "LOST_SAMPLES")
 
 
+def test_three_samples_are_not_looked_at() -> None:
+    assert of_signals(spoiled("DEGREES").part(0, 3)) == ()
+    assert of_signals(spoiled("DEGREES").part(0, 4)) != ()
+
+
 def test_a_refusal_names_what_overrides_it_and_yields_to_that() -> None:
     log = spoiled("EFFORT_ZERO")
     found = inspect_log(log)

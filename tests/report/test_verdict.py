@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import pytest
 
@@ -23,10 +23,15 @@ LOST = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
 VAGUE = Estimate(
     estimate=0.1, std=1.0, ci95=(-1.9, 2.1), unit="kg m^2", status=Status.NOT_SIGNIFICANT
 )
+PRIOR = Estimate(estimate=1.0, std=0.1, ci95=(0.8, 1.2), unit="s", status=Status.FROM_PRIOR)
+WORSE = Bound(bound="k3 >= 0", value=-0.1, distance_sigma=9.0)
 WEAK = Estimate(estimate=None, unit="kg m^2", status=Status.WEAK_EXCITATION)
 HANGING = Notice("WRONG_ZERO", numbers={"turn": -90.0}, remedies=(Remedy({"zero": "hanging"}),))
 OTHERS = Notice("OTHER_JOINTS", numbers={"count": 1, "joints": "wrist", "samples": 9})
 REFUTED = Notice("REFUTED", numbers={"case": "noise", "kept": "weak"})
+LENGTH = Notice(
+    "LENGTH_CONTRADICTED", numbers={"case": "stated", "name": "l1", "given": 0.3, "stated": 0.2}
+)
 APART = Notice("LOGS_APART", numbers={"case": "apart", "distance": 9.0})
 JITTER = {"case": "jitter", "jitter": 0.06, "period": 2.0, "error": 1e-6}
 UNEVEN = Notice("UNEVEN_STAMPS", numbers=JITTER, logs=("a.csv",))
@@ -74,7 +79,7 @@ def implausible(result: Result, **changes: object) -> Result:
     return with_fit(result, **changes).model_copy(update=groups)
 
 
-def broken(sigma: float | None) -> dict[str, object]:
+def broken(sigma: float | None) -> dict[str, list[Bound]]:
     return {"broken_bounds": [Bound(bound="k7 >= 0", value=-0.3, distance_sigma=sigma)]}
 
 
@@ -86,12 +91,13 @@ def off_truth(result: Result, sigmas: float) -> Result:
     return result.model_copy(update={"table4": [far]})
 
 
-def chosen(result: Result, by: str) -> Result:
+def chosen(result: Result, by: str, **more: list[str]) -> Result:
     """With a term whose coefficient is not significant, and who chose it."""
     model = TorqueModel(
         terms=["coulomb"], coulomb_speed=0.1, stribeck_speed=0.1, chosen_by="settings"
     )
-    return of(with_fit(result, model=model.model_copy(update={"chosen_by": by})), VAGUE, "f1")
+    model = model.model_copy(update={"chosen_by": by, **more})
+    return of(with_fit(result, model=model), VAGUE, "f1")
 
 
 @dataclass(frozen=True)
@@ -120,6 +126,24 @@ CASES = {
         lambda r: of(r, estimate(0.05, 0.01, "N m"), "k2"), codes=["WIDE_INTERVAL"], words="±39 %"
     ),
     "narrower": Case(lambda r: of(r, estimate(-2, 0.1, "N m"), "k2"), "good", [], "k2, to ±9.8 %"),
+    "all from a prior": Case(
+        lambda r: alone(r, PRIOR), "failed", ["FROM_PRIOR"], "no parameter"
+    ),
+    "vague shrunk term of the user": Case(lambda r: chosen(r, "settings", shrunk=["f1"]), "good"),
+    "vague phase of the logs": Case(
+        lambda r: of(chosen(r, "logs", terms=["phases"]), VAGUE, "k2s"), codes=["NOT_SIGNIFICANT"]
+    ),
+    "another estimator": Case(
+        lambda r: of(r, LOST, "k5").model_copy(update={"settings": {"estimator": "paper"}}),
+        codes=["NOT_IDENTIFIABLE"], words="by the refined estimator in place of the paper one",
+    ),
+    "a length": Case(
+        lambda r: noticed(r, LENGTH), "failed", ["LENGTH_CONTRADICTED"], "a link length contradict"
+    ),
+    "the worst bound first": Case(
+        lambda r: implausible(r, broken_bounds=[*broken(4.0)["broken_bounds"], WORSE]),
+        "failed", ["UNKNOWN_CAUSE", "BROKEN_BOUND"], "break k3 >= 0 by 9",
+    ),
     "bound": Case(lambda r: with_fit(r, **broken(4.0)), codes=["BROKEN_BOUND"]),
     "coloured": Case(coloured, codes=["NOT_WHITE"]),
     "coloured, allowed for": Case(lambda r: coloured(r, "sandwich"), "good"),
@@ -210,6 +234,7 @@ TYPED = "algid identify 'a b.csv' -o out"
         (HANGING, {"settings": {"command": f"{TYPED} --force"}}, f"{TYPED} --force --zero hanging"),
         (HANGING, {"profile": {"zero": "hanging"}}, None),  # said already
         (OTHERS, {}, None),
+        (replace(HANGING, remedies=(Remedy({"accept": "WRONG_ZERO"}),)), {}, None),
         (
             None,
             {"profile": {"zero": "hanging", "tau1": {"sign": -1}}},
