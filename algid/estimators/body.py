@@ -41,15 +41,17 @@ def with_body(fit: Fit) -> Fit:
     if not fit.shared.payload or not fit.converged:
         return fit
     names, worth = _candidates(fit)
-    for count in range(len(names), 0, -1):
-        worthy = []
-        for chosen in combinations(names, count):
-            candidate = with_body_of(fit, chosen)
-            if min(_worths(candidate)) > worth:
-                worthy.append(candidate)
-        if worthy:
-            return max(worthy, key=_likelihood)
+    every = [with_body_of(fit, body) for body in _bodies(names)]
+    worthy = [one for one in every if min(_worths(one)) > worth]
+    if worthy:
+        return max(worthy, key=lambda one: (len(one.shared.body), _likelihood(one)))
     return with_body_of(fit, ())
+
+
+def _bodies(names: Sequence[str]) -> Iterator[tuple[str, ...]]:
+    """Sets of one or more of the parameters `names`, the smallest first."""
+    for count in range(1, len(names) + 1):
+        yield from combinations(names, count)
 
 
 def averaged_over_bodies(fit: Fit) -> Fit:
@@ -71,9 +73,11 @@ def averaged_over_bodies(fit: Fit) -> Fit:
     if not fit.shared.payload or not fit.converged:
         return fit
     values, covariances, weights = [fit.values], [fit.covariance], [1.0]
-    for body in _larger_bodies(fit):
+    names, _ = _candidates(fit)
+    for more in _bodies(outside(names, fit.shared.body)):
+        body = within(BODY_PARAMETERS, fit.shared.body + more)
         other = with_body_of(fit, body)
-        weight = _weight(other, outside(body, fit.shared.body))
+        weight = _weight(other, more)
         if weight > 0:
             places = list(map(other.names.index, fit.names))
             values.append(other.values[places])
@@ -85,16 +89,6 @@ def averaged_over_bodies(fit: Fit) -> Fit:
     mixed = np.einsum("i,iab->ab", w, np.array(covariances))
     mixed += np.einsum("i,ia,ib->ab", w, apart, apart)
     return replace(fit, values=beta, covariance=mixed)
-
-
-def _larger_bodies(fit: Fit) -> Iterator[tuple[str, ...]]:
-    """Sets of parameters of the body that hold those of the fit and more, the smallest first."""
-    names, _ = _candidates(fit)
-    others = outside(names, fit.shared.body)
-    for count in range(1, len(others) + 1):
-        for more in combinations(others, count):
-            own = fit.shared.body + more
-            yield within(BODY_PARAMETERS, own)
 
 
 _MOST = 100.0  # W / 2, beyond which a weight is all there is

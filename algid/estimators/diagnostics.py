@@ -87,12 +87,8 @@ def bounds(shared: Shared) -> dict[str, Callable[[FloatArray], float]]:
         )
     for place, name in enumerate(shared.names):
         if name in _NOT_NEGATIVE:
-            by_text[f"{name} >= 0"] = partial(_parameter, place)
+            by_text[f"{name} >= 0"] = lambda beta, place=place: float(beta[place])  # type: ignore[misc]
     return by_text
-
-
-def _parameter(place: int, beta: FloatArray) -> float:
-    return float(beta[place])
 
 
 def _mass(shared: Shared, beta: FloatArray) -> tuple[float, float, float]:

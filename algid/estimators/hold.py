@@ -103,12 +103,8 @@ class Lateness:
     @property
     def prior(self) -> Prior:
         """The delay's prior where the log leaves it open."""
-        mean, spread = self._expected
-        return Prior(DELAYS, np.array([mean]), np.array([[spread**-2]]))
-
-    @property
-    def _expected(self) -> tuple[float, float]:
-        """Mean and standard deviation of that prior, in s."""
+        # between none and half a sample, or half of a faster controller's period
+        mean = spread = 0.5 * self.half
         if self.faster:
-            return 0.5 * CONTROLLER, CONTROLLER
-        return 0.5 * self.half, 0.5 * self.half
+            mean, spread = 0.5 * CONTROLLER, CONTROLLER
+        return Prior(DELAYS, np.array([mean]), np.array([[spread**-2]]))

@@ -29,7 +29,7 @@ gram    [Z X y] [Z X y]ᵀ by stretch and joint             (B, 2, 2 q + 1, 2 q 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,25 +58,6 @@ _STEP = 4e-3  # s: of the simulation, in which motions of 10 Hz turn by a quarte
 _ASTRAY = 100.0  # rad: a simulated window that ends so far from the measured one has run away
 _FEWEST = 0.5  # share of the windows that must not go astray
 _TOGETHER = 8 * (weak.PIECE_SAMPLES + 4096)  # samples whose windows are simulated side by side
-
-
-@dataclass(eq=False)
-class Moments:
-    """Sums of one log: of `rows` windows, of which `astray` could not be simulated.
-
-    `moves` says whether the coefficients move the arm.
-    """
-
-    grams: BlockSums = field(default_factory=BlockSums)
-    rows: int = 0
-    astray: int = 0
-    moves: bool = True
-
-    def add(self, both: FloatArray, good: NDArray[np.bool_]) -> None:
-        """Add instruments and columns (2, 2 q + 1, R) of windows; only `good` ones (R,) count."""
-        self.rows += good.size
-        self.astray += int(np.sum(np.logical_not(good)))
-        self.grams.add(weak.grams(np.where(good, both, 0.0), OVERLAP // _STRIDE))
 
 
 def fit(problem: Problem, start: Fit | None = None) -> Fit:
@@ -128,7 +109,10 @@ def evidence(
 ) -> list[LogInformation] | None:
     """Each log's likelihood projected on instruments, simulated at shared parameters `beta` (Q,).
 
-    Its rows weigh by their residual there. None where the windows cannot be simulated.
+    Where it is known how the arm is `following` a reference, the motion that this explains stands
+    in place of a simulated one. Rows weigh by their residual at `beta`. None where the parameters
+    move no arm, or most windows cannot be simulated. The windows of many pieces are simulated side
+    by side: a step costs the same for few as for many.
     """
     logs, settings = [], problem.settings
     for kind, sources in problem.kinds():
@@ -136,12 +120,25 @@ def evidence(
         c = c0.copy()
         if shared.delay:
             c[-1] -= settings.shift.delay  # the windows are shifted by it: the column is a change's
-        for sums in moments(sources, settings, c, following):
-            if not sums.moves or sums.astray > _FEWEST * sums.rows:
-                return None
-            if sums.rows:
-                gram, good = sums.grams.values(), sums.rows - sums.astray
-                logs.append(replace(projected(gram, good, c, kind), c0=c0))
+        grams = [BlockSums() for _ in sources]
+        rows, lost = np.zeros((2, len(grams)), dtype=np.int64)
+        for batch in _batches(sources, settings):
+            if following is None:
+                instruments = _side_by_side(batch, settings, c)
+            else:
+                instruments = _explained(following, batch, settings, c)
+            for (number, _, _), (both, good, moves) in zip(batch, instruments, strict=True):
+                if not moves:
+                    return None
+                rows[number] += good.size
+                lost[number] += np.sum(~good)
+                own = np.where(good, both, 0.0)
+                grams[number].add(weak.grams(own, OVERLAP // _STRIDE))
+        if np.any(lost > _FEWEST * rows):
+            return None
+        for sums, used in zip(grams, (rows - lost).tolist(), strict=True):
+            if used:
+                logs.append(replace(projected(sums.values(), used, c, kind), c0=c0))
     return logs
 
 
@@ -159,32 +156,6 @@ def projected(gram: FloatArray, rows: int, c: FloatArray, loaded: bool) -> LogIn
     projection = A.sum(axis=0).T @ scaled_pinv(V)
     scores = gram[:, :q, -1] - A @ c
     return LogInformation(loaded, c, projection @ A, scores @ projection.T)
-
-
-def moments(
-    sources: Sequence[Source],
-    settings: WeakSettings,
-    c: FloatArray,
-    following: Following | None = None,
-) -> list[Moments]:
-    """Sums over each log, the windows simulated with coefficients `c`.
-
-    Where it is known how the arm is `following` a reference, the motion that this explains stands
-    in place of a simulated one.
-
-    The windows of many pieces are simulated side by side: a step costs the same for few as for
-    many.
-    """
-    gathered = [Moments() for _ in sources]
-    for batch in _batches(sources, settings):
-        if following is None:
-            instruments = _side_by_side(batch, settings, c)
-        else:
-            instruments = _explained(following, batch, settings, c)
-        for (number, _, _), (both, good, moves) in zip(batch, instruments, strict=True):
-            gathered[number].moves &= moves
-            gathered[number].add(both, good)
-    return gathered
 
 
 _Piece = tuple[int, Segment, Windows]

@@ -101,7 +101,12 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
     if turn > FAR:
         numbers = {"case": "turn", "kept": start.estimator, "turn": turn, "rate": turn / FAR / dt}
         return start.noted(Notice("SLOW_SAMPLING", numbers=numbers))
-    refuted = start.noted(Notice("REFUTED", numbers={"case": "noise", "kept": start.estimator}))
+    iterations = 0
+
+    def given_up(case: str, **more: float) -> Fit:
+        numbers = {"case": case, "kept": start.estimator} | more
+        return replace(start.noted(Notice("REFUTED", numbers=numbers)), iterations=iterations)
+
     try:
         beta, outcomes, iterations, end = _train(shared, logs, start.values, anchored, progress)
         width = None
@@ -110,17 +115,14 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
                 shared, logs, (beta, outcomes, end), anchored, progress
             )
         if end == "refuted":
-            return replace(refuted, iterations=iterations)
+            return given_up("noise")
         settled = end == "settled" and bool(np.all(np.isfinite(beta)))
         if settled and not all(log.whole for log in logs):
             beta, outcomes = _finish(shared, logs, beta, anchored)
     except np.linalg.LinAlgError:
         settled, iterations = False, 0
     if not settled:
-        failed = start.noted(
-            Notice("REFUTED", numbers={"case": "not converged", "kept": start.estimator})
-        )
-        return replace(failed, iterations=iterations)
+        return given_up("not converged")
     whiteness = judge(reduce(add, [outcome.residual for outcome in outcomes]))
     informations = [outcome.information for outcome in outcomes]
     samples = int(_count(outcomes))
@@ -145,9 +147,7 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
             products.append((log.loaded, gram.sum(axis=0)))
         lacking = misfit(fitted, products, prior)
         if lacking.significant:
-            numbers = {"kept": start.estimator, "p_value": lacking.p_value}
-            refuted = start.noted(Notice("REFUTED", numbers={"case": "motion"} | numbers))
-            return replace(refuted, misfit=lacking, iterations=iterations)
+            return replace(given_up("motion", p_value=lacking.p_value), misfit=lacking)
     # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.
     status = list(fitted.status)
     for place, before in enumerate(start.status):

@@ -353,7 +353,8 @@ class RobustProblem:
         Along the motion that a reference explains, where the arm is `following` one, else along a
         simulated one; None where the windows cannot be simulated.
         """
-        problem = _of(least, self.problem)
+        delay = least.shared.delay
+        problem = self.problem.at(least.shared.model, least.delay, estimate_delay=delay)
         logs = instruments.evidence(problem, self.shared, at, following)
         if logs is None or len(logs) != len(least.logs) or least.shrinkage is None:
             return None
@@ -491,18 +492,15 @@ def shrink(
         square = ((beta[places] - expected.mean) ** 2 + variance) / expected.spread**2
         better = np.empty(len(terms))
         for place, (term, usual) in enumerate(zip(terms, expected.usual, strict=True)):
-            better[place] = _share(square[terms == term], usual)
+            # of n squares of a term, and one more of the usual size that it shrinks to
+            own = square[terms == term]
+            better[place] = min(1.0, np.sqrt((np.sum(own) + usual**2) / (own.size + 1)))
         change = float(np.max(np.abs(np.log(better / np.maximum(share, _LEAST))), initial=0.0))
         share = better
         if change < _SETTLED:
             break
     beta, _, _ = combine(shared, logs, beta, joined(known, expected.prior(share)))
     return beta, share
-
-
-def _share(squares: FloatArray, usual: float) -> float:
-    """Share of s from n squares of a term, and one more of the size `usual` that it shrinks to."""
-    return min(1.0, float(np.sqrt((np.sum(squares) + usual**2) / (squares.size + 1))))
 
 
 def compared(better: Fit, least: Fit) -> tuple[float, float, float]:
@@ -522,11 +520,6 @@ def compared(better: Fit, least: Fit) -> tuple[float, float, float]:
     h = float(away @ scaled_pinv(V[np.ix_(places, places)]) @ away)
     distance, moved = (float(np.max(np.abs(away) / fit.std[places])) for fit in (better, least))
     return distance, moved, float(chi2_tail(places.size, max(h, 0.0)))
-
-
-def _of(fit: Fit, problem: Problem) -> Problem:
-    """The logs by the fit's model and delay."""
-    return problem.at(fit.shared.model, fit.delay, estimate_delay=fit.shared.delay)
 
 
 def _influences(fit: Fit) -> list[FloatArray]:

@@ -32,7 +32,6 @@ from algid.identification.passes import long_enough, problem_of
 from algid.identification.recordings import Recordings
 from algid.methods import estimator_of
 from algid.model import (
-    CHOICES,
     COLUMN_NAMES,
     DELAYS,
     EVERY_TERM,
@@ -318,14 +317,15 @@ def _most_evident(misfit: Misfit | None, chosen: Selection) -> str | None:
         return None
     left = {trial.term for trial in chosen.trials if not trial.kept}
     least = level("REFUTED") / max(1, len(misfit.overlooked))
-    seen = []
-    for one in misfit.overlooked:
-        possible = one.term in left and has_need(one.term, chosen.model.terms)
-        if possible and one.p_value < least and plausible(one.values):
-            seen.append((one.p_value, one.term))
-    if not seen:
-        return None
-    return min(seen)[1]
+    seen = [
+        (one.p_value, one.term)
+        for one in misfit.overlooked
+        if one.term in left
+        and has_need(one.term, chosen.model.terms)
+        and one.p_value < least
+        and plausible(one.values)
+    ]
+    return min(seen)[1] if seen else None
 
 
 def _insignificant(chosen: Selection, fit: Fit) -> set[str]:
@@ -334,18 +334,14 @@ def _insignificant(chosen: Selection, fit: Fit) -> set[str]:
     size = dict(zip(fit.names, np.abs(fit.values) / np.maximum(fit.std, 1e-300), strict=True))
     # the arm's constants would move without what was kept in spite of its price
     needed = {trial.term for trial in chosen.trials if trial.kept and trial.evidence <= 0}
+    needed |= {EVERY_TERM[other].needs or "" for other in chosen.model.terms}
+    present = chosen.model.terms
+    if chosen.delay and chosen.undetermined is None:
+        present += DELAYS
     terms = set()
-    for name in CHOICES:
+    for name in outside(present, needed):
         term = EVERY_TERM[name]
-        if name not in chosen.model.terms and set(term.names).isdisjoint(fit.names):
-            continue
-        if name in DELAYS and chosen.undetermined is not None:
-            continue
         if term.sines and "y_p" in fit.shared.body:  # the payload's offset shows in them
-            continue
-        if any(EVERY_TERM[other].needs == name for other in chosen.model.terms):
-            continue
-        if name in needed:
             continue
         if max(size.get(parameter, 0.0) for parameter in term.names) < least:
             terms.add(name)

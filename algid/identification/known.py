@@ -230,33 +230,22 @@ def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice
 
     What it identified are the payload's lengths, or l1 = g k1 / k2.
     """
-    stated = given_lengths(result)
-    identified: dict[str, tuple[float | None, float | None]] = {}
-    for name in ("l1", "l2"):
-        if name in result.payload:
-            identified[name] = (result.payload[name].estimate, result.payload[name].std)
-    by_constants = first_length(result)
-    if by_constants is not None:
-        identified["l1"] = by_constants
+    stated, by_constants = given_lengths(result), first_length(result)
     notices = []
     for name, given in lengths.items():
+        numbers = {"name": name, "given": given}
         if name in stated:
             if not isclose(given, stated[name], rel_tol=SAME_LENGTH):
-                numbers = {"case": "stated", "name": name, "given": given, "stated": stated[name]}
+                numbers |= {"case": "stated", "stated": stated[name]}
                 notices.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
             continue
-        estimate, std = identified.get(name, (None, None))
-        if estimate is None or not std:
+        own = result.payload.get(name)
+        estimate, std = (None, None) if own is None else (own.estimate, own.std)
+        if name == "l1" and by_constants is not None:
+            estimate, std = by_constants
+        if estimate is None or not std or abs(given - estimate) <= FAR * std:
             continue
-        distance = abs(given - estimate) / std
-        if distance > FAR:
-            numbers = {
-                "case": "identified",
-                "name": name,
-                "given": given,
-                "distance": distance,
-                "estimate": estimate,
-                "half": result.quantile * std,
-            }
-            notices.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
+        numbers |= {"case": "identified", "distance": abs(given - estimate) / std}
+        numbers |= {"estimate": estimate, "half": result.quantile * std}
+        notices.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
     return tuple(notices)

@@ -253,14 +253,14 @@ def _whiteness(fit: Fit) -> dict[str, results.WhitenessTest]:
     tests = fit.whiteness
     if tests is None:
         return {}
-    by_joint = {}
-    for joint in range(2):
-        by_joint[f"tau{joint + 1}"] = results.WhitenessTest(
+    return {
+        f"tau{joint + 1}": results.WhitenessTest(
             white=tests.joint_white[joint],
             p_value=finite(float(tests.p_value[joint])),
             lag1_correlation=float(tests.lag1[joint]),
         )
-    return by_joint
+        for joint in range(2)
+    }
 
 
 def _bounds(fit: Fit) -> list[results.Bound]:
