@@ -55,7 +55,6 @@ if TYPE_CHECKING:
 Verb = TypeVar("Verb", bound=Callable[..., Any])
 CALLERS = ("settings", "progress", "complain", "command", "sensors", "labels")
 """Keywords that no command line has."""
-EMPTY = inspect.Parameter.empty
 
 ProfileLike = Annotated["Profile | str | Path | Mapping[str, Any]", Option(kind=Path)]
 """A profile, the path of its file, or what would stand in that."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from shutil import copyfile
 from types import SimpleNamespace
 from typing import Any
 
@@ -140,6 +141,24 @@ def test_results_are_named_by_what_tells_them_apart(tmp_path: Path) -> None:
     assert call("compare", tmp_path / "a.algid").err == (
         "algid: compare: expected two results or more, found 1; name another one\n"
     )
+
+
+def test_a_batch_beside_an_arms_result_takes_its_logs_for_loaded_ones(
+    result: Path, tmp_path: Path
+) -> None:
+    copyfile(result.parent / "case1-loaded.mcap", tmp_path / "monday.mcap")
+    quick = ("--estimator", "weak", "--workers", "1", "--no-report")
+    done = call("batch", tmp_path, "-o", tmp_path / "out", "--parameters", result, *quick)
+    assert done.code == 0, done.out
+    found = algid.read_result(tmp_path / "out" / "monday.algid").payload["m_p"]
+    assert found.estimate == pytest.approx(0.3515, rel=0.05)
+
+
+def test_a_profile_that_is_there_is_refused_before_the_log_is_read(tmp_path: Path) -> None:
+    (tmp_path / "algid.toml").touch()
+    done = call("inspect", tmp_path / "absent.csv", "--write-profile", tmp_path)
+    assert (done.code, done.out) == (2, "")
+    assert "algid.toml: exists already" in done.err
 
 
 def synthetic(folder: Path, *flags: str, role: str = "unloaded") -> pl.DataFrame:

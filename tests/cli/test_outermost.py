@@ -4,7 +4,6 @@ drives no terminal.
 
 from __future__ import annotations
 
-import ast
 import json
 import os
 import subprocess
@@ -15,7 +14,6 @@ from typing import Any
 
 import pytest
 
-import algid.cli
 from algid.base.exits import Exit
 from algid.base.text import printable
 from algid.cli.app import run as run_command
@@ -227,26 +225,3 @@ def test_a_terminals_own_colours_pass_and_a_texts_do_not(
     shown = capsys.readouterr().out
     assert shown.startswith("\x1b[1mbad ")
     assert "\x1b]0" not in shown
-
-
-def test_no_command_prints_but_through_the_one_place() -> None:
-    """`print`, typer's echo and a bare console know nothing of what drives a terminal."""
-    folder = Path(algid.cli.__file__).parent
-    found = []
-    for path in folder.glob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            name = (
-                getattr(node.func, "attr", getattr(node.func, "id", ""))
-                if isinstance(node, ast.Call)
-                else ""
-            )
-            if name in ("print", "echo", "secho", "Console") and path.name != "output.py":
-                found.append((path.name, ast.unparse(node)))
-    allowed = (
-        "console",
-        "terminal.print",
-        "print('algid: it runs on",
-        "print(f'\\r\\x1b",
-        "print('\\r\\x1b",
-    )
-    assert [one for one in found if not one[1].startswith(allowed)] == []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pty
 import re
 import tempfile
 from dataclasses import replace
@@ -15,7 +14,8 @@ import algid
 from algid.identification.identify import identify
 from algid.log import Log
 from algid.settings import Settings
-from tests.processes import Outcome, begin
+from tests.processes import Outcome
+from tests.terminals import on_a_terminal
 
 COLOUR = re.compile(r"\x1b\[[0-9;]*3[0-9]")
 
@@ -35,35 +35,15 @@ def path(log: Log, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def on_a_terminal(*arguments: object, **environment: str) -> tuple[str, str]:
-    """What a command that ends well prints to a file as stdout and to a terminal as stderr."""
-    ours, theirs = pty.openpty()
-    settings = {
-        "TERM": "xterm",
-        **{k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "TERM")},
-    }
-    with tempfile.TemporaryFile() as printed:
-        ended = begin(
-            *arguments, stdout=printed.fileno(), stderr=theirs, env=settings | environment
-        )
-        os.close(theirs)
-        seen = b""
-        try:
-            while part := os.read(ours, 1 << 16):
-                seen += part
-        except OSError:  # Linux: the other end is closed
-            pass
-        os.close(ours)
-        assert ended() == 0, seen
-        printed.seek(0)
-        return printed.read().decode(), seen.decode()
-
-
 @pytest.mark.slow
 def test_a_terminal_is_shown_stages_and_samples_and_is_left_clean(
     path: Path, tmp_path: Path
 ) -> None:
-    printed, seen = on_a_terminal("identify", path, "-o", tmp_path)
+    with tempfile.TemporaryFile() as file:
+        code, seen = on_a_terminal("identify", path, "-o", tmp_path, stdout=file.fileno())
+        file.seek(0)
+        printed = file.read().decode()
+    assert code == 0, seen
     assert "reading" in seen
     assert "of 2,001 samples" in seen
     assert COLOUR.search(seen)

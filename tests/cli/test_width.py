@@ -4,19 +4,16 @@ cut.
 
 from __future__ import annotations
 
-import fcntl
 import os
-import pty
 import re
-import struct
-import termios
 from pathlib import Path
 
 import pytest
 
-from tests.processes import Outcome, begin
+from tests.processes import Outcome
+from tests.terminals import WIDTH, on_a_terminal
 
-WIDTH, HEIGHT = 80, 25
+HEIGHT = 25
 CONTROL = re.compile(r"\x1b\[([0-9;?]*)([A-Za-z])|(\r)|(\n)")
 RESULTS = ("identify", "validate", "track", "batch", "synth", "export", "convert")
 """What has a screen at most; a log's channels, tables of a report and comparisons may be many."""
@@ -54,28 +51,6 @@ def words(call: str, result: Path, short: Path, out: Path) -> list[str]:
     return [word.format(**places) for word in call.split()]
 
 
-def on_a_terminal(*arguments: str, cwd: Path) -> list[str]:
-    """The lines that a command leaves on a terminal of 80 columns."""
-    ours, theirs = pty.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, WIDTH, 0, 0))
-    env = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES")}
-    env |= {"TERM": "xterm"}
-    wait = begin(*arguments, stdout=theirs, stderr=theirs, cwd=cwd, env=env)
-    os.close(theirs)
-    printed = b""
-    while True:
-        try:
-            piece = os.read(ours, 1 << 16)
-        except OSError:  # the other end is closed
-            break
-        if not piece:
-            break
-        printed += piece
-    wait()
-    os.close(ours)
-    return left(printed.decode())
-
-
 def left(printed: str) -> list[str]:
     """What stays of the lines once a bar of progress has moved up and erased itself."""
     lines, row, column, place = [""], 0, 0, 0
@@ -104,7 +79,8 @@ def test_what_is_printed_fits_eighty_columns(
 ) -> None:
     env = {name: value for name, value in os.environ.items() if name != "COLUMNS"}
     piped = Outcome(*words(call, result, short, tmp_path / "pipe"), cwd=tmp_path, env=env)
-    shown = on_a_terminal(*words(call, result, short, tmp_path / "screen"), cwd=tmp_path)
+    _, seen = on_a_terminal(*words(call, result, short, tmp_path / "screen"), cwd=tmp_path)
+    shown = left(seen)
     assert piped.code in (0, 3), piped.err
     for lines in ([*piped.out.splitlines(), *piped.err.splitlines()], shown):
         for line in lines:
