@@ -208,7 +208,12 @@ def test_angles_of_many_turns_are_read_where_physics_holds() -> None:
     assert not of_codes(examine(logged(WIDE), lambda: judged), *SCALES)
 
 
-def test_what_is_no_torque_is_told_with_what_names_another() -> None:
+def test_what_is_refused_is_told_with_what_mends_it() -> None:
+    (wrap,) = of_codes(of_signals(logged(jumped(1))), "WRAPPED_ANGLE")
+    assert wrap.refuse
+    assert wrap.advice == (
+        "--set theta2.unwrap=true; to use it nevertheless: --accept WRAPPED_ANGLE"
+    )
     name = "name the measured torque: --set tau{}.source=NAME"
     nevertheless = "to use it nevertheless: --accept EFFORT_ZERO"
     (zero,) = of_codes(of_signals(logged(tau2=0 * T)), "EFFORT_ZERO")
@@ -277,15 +282,6 @@ def test_steps_twice_as_long_are_counted(lost: int, told: int) -> None:
     steps[40 + 40 * np.arange(math.ceil(lost / 5))] = 0.0
     place = 1e-3 * np.cumsum(steps)
     assert lost_steps(logged(-2 * place, theta1=place)) == 0
-
-
-def test_a_wrap_is_told_with_what_undoes_it() -> None:
-    (found,) = of_codes(of_signals(logged(jumped(1))), *ANGLES)
-    assert found.refuse
-    assert found.clause == (
-        "theta2 jumps by a turn 1 time: --set theta2.unwrap=true; "
-        "to use it nevertheless: --accept WRAPPED_ANGLE"
-    )
 
 
 def test_jitter_is_told_with_what_resampling_costs() -> None:

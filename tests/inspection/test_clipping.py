@@ -9,9 +9,10 @@ import pytest
 
 from algid.identification.open_logs import open_sources
 from algid.identification.recordings import Recordings
-from algid.inspection.channels import beyond, clipped, saturation
+from algid.inspection.channels import saturation
 from algid.inspection.checks import inspect_log
 from algid.log import Log
+from algid.notices import has_code, of_codes
 from tests.inspection.test_checks import moving_log
 
 LIMIT = 18.0
@@ -28,7 +29,7 @@ def surveyed(log: Log) -> Recordings:
 
 
 def told(survey: Recordings) -> list[str]:
-    return [one.text for one in survey.notices(survey.logs[0]) if one.code == "CLIPPED_TORQUE"]
+    return [one.text for one in of_codes(survey.notices(survey.logs[0]), "CLIPPED_TORQUE")]
 
 
 def test_samples_beyond_a_sensor_s_range_are_left_out_and_counted() -> None:
@@ -47,9 +48,9 @@ def test_samples_beyond_a_sensor_s_range_are_left_out_and_counted() -> None:
 
 def test_they_are_lost_data_and_used_where_that_is_accepted() -> None:
     log = cut_off()
-    known = saturation(log)
-    counts = beyond(log, known.limits)
-    (notice,) = clipped(log.origin, known.limits, counts, len(log))
+    found = inspect_log(log).findings
+    (notice,) = of_codes(found, "CLIPPED_TORQUE")
+    assert not has_code(found, "SATURATED_EFFORT")  # its limit is not true
     assert notice.lossy
     assert "--accept CLIPPED_TORQUE" in notice.advice
     reading = replace(log.origin.reading, accepted=("CLIPPED_TORQUE",))
@@ -64,12 +65,6 @@ def test_a_sound_log_loses_nothing() -> None:
     assert told(survey) == []
 
 
-def test_inspection_tells_them_in_place_of_a_limit_that_may_be_true() -> None:
-    codes = [one.code for one in inspect_log(cut_off()).findings]
-    assert codes.count("CLIPPED_TORQUE") == 1
-    assert "SATURATED_EFFORT" not in codes
-
-
 def test_an_external_torque_is_not_judged() -> None:
     assert saturation(cut_off(), effort="external").limits == ()
 
@@ -81,9 +76,7 @@ def test_a_limit_that_the_motion_confirms_is_a_note() -> None:
     peak = log.tau[0] >= top
     # the peak as the converter of a coarse sensor has it: what the arm gets is within its step
     tau = np.vstack([np.where(peak, log.tau[0][peak].mean(), log.tau[0]), log.tau[1]])
-    (found,) = [
-        one for one in inspect_log(replace(log, tau=tau)).findings if one.code == "SATURATED_EFFORT"
-    ]
+    (found,) = of_codes(inspect_log(replace(log, tau=tau)).findings, "SATURATED_EFFORT")
     assert found.note
     assert "the motion agrees" in found.text
 
@@ -92,6 +85,6 @@ def test_a_limit_that_the_motion_confirms_is_a_note() -> None:
 def test_a_limit_that_leaves_little_of_the_motion_is_confirmed_by_nothing(limit: float) -> None:
     log = moving_log()
     found = inspect_log(replace(log, tau=np.clip(log.tau, -limit, limit))).findings
-    doubts = [one for one in found if one.code == "SATURATED_EFFORT"]
+    doubts = of_codes(found, "SATURATED_EFFORT")
     assert doubts
     assert not any(one.note for one in doubts)
