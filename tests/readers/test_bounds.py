@@ -7,7 +7,11 @@ A text here is so long that a pattern which takes time with its square would not
 
 from __future__ import annotations
 
-from dataclasses import replace
+import json
+import math
+import os
+import zlib
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +27,7 @@ from algid.readers.stated import units_in
 from algid.writers import write_log
 from pipelines.mutations import clean_log
 from tests.conftest import Limited
+from tests.readers.logs import TRUTH, same
 
 COLUMNS = ("t", "theta1", "theta2", "tau1", "tau2")
 ROWS = [f"{row / 100},{row % 7},{row % 5},{row % 3},{row % 2}" for row in range(300)]
@@ -95,3 +100,38 @@ def test_steps_that_no_arm_is_sampled_with_are_refused(
         identify(tmp_path / f"log.{kind}", report=False)
     with pytest.raises(LogError, match="as no arm's log is"):
         identify(quick, report=False)
+
+
+def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / os.fsdecode(b"bad\xff.csv")
+    path.write_text("t,theta1,theta2,tau1,tau2\n0,0,0,0,0\n")
+    with pytest.raises(LogError, match="not valid UTF-8; rename"):
+        read_log(path)
+
+
+def test_what_is_no_file_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "log.csv")
+    for path in (tmp_path / "log.csv", Path("/dev/zero"), Path("/dev/null")):
+        with pytest.raises(LogError, match="no regular file"):
+            read_log(path)
+
+
+@pytest.mark.parametrize("name", ["col[1]", "a*", "q?", "**", "{a,b}", "~"])
+@pytest.mark.parametrize("kind", ["parquet", "csv"])
+def test_a_path_is_no_pattern(name: str, kind: str, tmp_path: Path) -> None:
+    write_log(tmp_path / f"{name}.{kind}", clean_log(20))
+    for other in ("col1", "ab", "qq", "a", "b"):
+        write_log(tmp_path / f"{other}.{kind}", clean_log(10))
+    assert same(read_log(tmp_path / f"{name}.{kind}"), clean_log(20))
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, 10**400])
+def test_a_truth_that_is_no_number_is_refused(number: float, tmp_path: Path) -> None:
+    content = {"sums": {}, "arm": asdict(TRUTH.arm), "payload": number, "case": None}
+    text = json.dumps(
+        {**content, "crc32": zlib.crc32(json.dumps(content, sort_keys=True).encode())}
+    )
+    table = pa.table({name: [0.0, 1.0] for name in COLUMNS})
+    pq.write_table(table.replace_schema_metadata({"algid": text}), tmp_path / "log.parquet")
+    with pytest.raises(LogError, match=r"truth in the .* file is damaged"):
+        read_log(tmp_path / "log.parquet")

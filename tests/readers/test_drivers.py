@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -14,62 +15,46 @@ from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
 from tests.readers.logs import EPOCH_NS, noise_log
-from tests.readers.mcaps import TOPIC, joint_state, messages_of, write_mcap
+from tests.readers.mcaps import TOPIC, joint_state
+from tests.readers.ways import States, sent, written
 
 LOG = noise_log(80, start_ns=EPOCH_NS)
 DRIVERS = {
-    "libfranka": (
-        "state.q[{}]",
-        "state.tau_J[{}]",
-        "state.dq[{}]",
-        ("state.q_d[{}]", "state.tau_J_d[{}]"),
-    ),
+    "libfranka": "state.q[{}] state.tau_J[{}] state.dq[{}] state.q_d[{}] state.tau_J_d[{}]",
     "franka_ros": (
-        "franka_state.q[{}]",
-        "franka_state.tau_J[{}]",
-        "franka_state.dq[{}]",
-        ("franka_state.dtheta[{}]",),
+        "franka_state.q[{}] franka_state.tau_J[{}] franka_state.dq[{}] franka_state.dtheta[{}]"
     ),
     "unitree": (
-        "motor_state[{}].q",
-        "motor_state[{}].tau_est",
-        "motor_state[{}].dq",
-        ("motor_state[{}].temperature",),
+        "motor_state[{}].q motor_state[{}].tau_est motor_state[{}].dq motor_state[{}].temperature"
     ),
     "low_state": (
-        "low_state.motor_state[{}].q",
-        "low_state.motor_state[{}].tau_est",
-        "low_state.motor_state[{}].dq",
-        (),
+        "low_state.motor_state[{}].q low_state.motor_state[{}].tau_est low_state.motor_state[{}].dq"
     ),
     "PlotJuggler": (
-        "/low_state/motor_state[{}]/q",
-        "/low_state/motor_state[{}]/tau_est",
-        "/low_state/motor_state[{}]/dq",
-        (),
+        "/low_state/motor_state[{}]/q /low_state/motor_state[{}]/tau_est "
+        "/low_state/motor_state[{}]/dq"
     ),
 }
+"""Names of angle, torque, velocity, and others of a joint."""
 
 
 def columns(driver: str, joints: int) -> dict[str, object]:
     """The log as a table of a driver's names, with more joints of other values."""
-    theta, tau, omega, others = DRIVERS[driver]
     assert LOG.omega is not None
     table: dict[str, object] = {"t": LOG.t}
     for joint in range(joints):
         own = joint - (joints - 2)
-        for name, pair in ((theta, LOG.theta), (tau, LOG.tau), (omega, LOG.omega)):
-            table[name.format(joint)] = pair[own] if own >= 0 else np.full(len(LOG), 0.5 + joint)
-        table |= {name.format(joint): np.full(len(LOG), 7.0) for name in others}
+        for name, pair in zip_longest(DRIVERS[driver].split(), (LOG.theta, LOG.tau, LOG.omega)):
+            beside = np.full(len(LOG), 7.0 if pair is None else 0.5 + joint)
+            table[name.format(joint)] = beside if pair is None or own < 0 else pair[own]
     return table
 
 
 @pytest.mark.parametrize("driver", DRIVERS)
 @pytest.mark.parametrize("joints", [2, 7])
-def test_names_of_drivers_are_known(driver: str, joints: int, tmp_path: Path) -> None:
-    pl.DataFrame(columns(driver, joints)).write_parquet(tmp_path / "a.parquet")
+def test_names_of_drivers_are_known(driver: str, joints: int) -> None:
     chosen = None if joints == 2 else Profile(joints=("5", "6"))
-    log = read_log(tmp_path / "a.parquet", chosen)
+    log = read_log(pl.DataFrame(columns(driver, joints)), chosen)
     assert np.array_equal(log.theta, LOG.theta)
     assert np.array_equal(log.tau, LOG.tau)
     assert log.omega is not None
@@ -77,32 +62,23 @@ def test_names_of_drivers_are_known(driver: str, joints: int, tmp_path: Path) ->
     assert np.array_equal(log.omega, LOG.omega)
 
 
-def test_plain_columns_stand_before_those_of_a_state(tmp_path: Path) -> None:
-    table = {
-        **columns("libfranka", 2),
-        "q1": LOG.theta[0] + 1,
-        "q2": LOG.theta[1],
-        "tau1": LOG.tau[0],
-        "tau2": LOG.tau[1],
-    }
-    pl.DataFrame(table).write_parquet(tmp_path / "a.parquet")
-    assert np.array_equal(read_log(tmp_path / "a.parquet").theta[0], LOG.theta[0] + 1)
+def test_plain_columns_stand_before_those_of_a_state() -> None:
+    turned = dict(zip(("q1", "q2", "tau1", "tau2"), [*(LOG.theta + 1), *LOG.tau], strict=True))
+    log = read_log(pl.DataFrame(columns("libfranka", 2) | turned))
+    assert np.array_equal(log.theta, LOG.theta + 1)
 
 
 def test_of_two_topics_with_both_joints_it_is_said_which_was_taken(tmp_path: Path) -> None:
-    messages = [
-        *messages_of(LOG),
-        *(("/arm/state", stamp, data) for _, stamp, data in messages_of(LOG)),
-    ]
-    write_mcap(tmp_path / "a.mcap", messages)
-    log = read_log(tmp_path / "a.mcap")
+    messages = sent(LOG) + sent(LOG, topic="/arm/state")
+    path = written("cdr", tmp_path, States(messages))
+    log = read_log(path)
     (notice,) = (notice for notice in log.notices if notice.code == "JOINT_ORDER")
     assert notice.note
     assert (
         notice.text == "the joints are taken from '/joint_states'; there are two also on /arm/state"
     )
     assert [remedy.settings for remedy in notice.remedies] == [{"topic": "/arm/state"}]
-    chosen = read_log(tmp_path / "a.mcap", Profile(topic="/arm/state"))
+    chosen = read_log(path, Profile(topic="/arm/state"))
     assert not [notice for notice in chosen.notices if notice.code == "JOINT_ORDER"]
 
 
@@ -159,14 +135,8 @@ def write_both(path: Path, messages: list[tuple[str, int, bytes]]) -> None:
 
 
 def test_columns_that_may_be_the_torque_are_named(tmp_path: Path) -> None:
-    table = {
-        "t": LOG.t,
-        "q1": LOG.theta[0],
-        "q2": LOG.theta[1],
-        "tau1": 0 * LOG.t,
-        "tau2": LOG.tau[1],
-    }
-    pl.DataFrame({**table, "torque_sensor": LOG.tau[0], "torque_limit": LOG.t}).write_csv(
-        tmp_path / "a.csv"
-    )
+    names = ("t", "q1", "q2", "tau1", "tau2", "torque_sensor", "torque_limit")
+    t, tau = LOG.t, LOG.tau
+    table = dict(zip(names, (t, *LOG.theta, 0 * t, tau[1], tau[0], t), strict=True))
+    pl.DataFrame(table).write_csv(tmp_path / "a.csv")
     assert held_beside(read_log(tmp_path / "a.csv"), 1) == [{"tau1.source": "torque_sensor"}]

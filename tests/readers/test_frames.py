@@ -7,6 +7,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from datetime import UTC, datetime
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -145,3 +146,92 @@ def test_of_wide_lists_the_first_places_are_taken(tmp_path: Path) -> None:
         )
         assert np.allclose(log.theta[0], 6.2, rtol=1e-12)
         assert [notice.code for notice in log.notices if notice.lossy] == ["CUT_OFF"]
+
+
+SHORT = 300
+ZEROS = pa.array([0] * SHORT, pa.int8())
+ONES = pa.array(np.ones(SHORT))
+REFUSED = {
+    "union": pa.UnionArray.from_sparse(
+        pa.array([0] * SHORT, pa.int8()), [pa.array(np.ones(SHORT))]
+    ),
+    "dense union": pa.UnionArray.from_dense(
+        pa.array([0] * SHORT, pa.int8()),
+        pa.array(range(SHORT), pa.int32()),
+        [pa.array(np.ones(SHORT))],
+    ),
+    "run-end encoded": pa.RunEndEncodedArray.from_arrays(
+        pa.array([SHORT], pa.int32()), pa.array([1.0])
+    ),
+    "interval": pa.array([(1, 2, 3)] * SHORT, pa.month_day_nano_interval()),
+    "list view": pa.array([[1.0]] * SHORT, pa.list_view(pa.float64())),
+    "map": pa.array([[("a", 1)]] * SHORT, pa.map_(pa.string(), pa.int64())),
+    "binary": pa.array([b"x"] * SHORT),
+    "nothing": pa.nulls(SHORT),
+}
+
+
+def feather(path: Path, table: pa.Table) -> Path:
+    with pa.OSFile(str(path), "wb") as sink, pa.ipc.new_file(sink, table.schema) as file:
+        file.write_table(table, max_chunksize=100)
+    return path
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_a_type_that_holds_no_numbers_is_refused_where_it_is_needed_alone(
+    kind: str, tmp_path: Path
+) -> None:
+    table = arm(SHORT, 2).to_arrow()
+    beside = feather(tmp_path / "log.feather", table.append_column("extra", REFUSED[kind]))
+    assert np.array_equal(read_log(beside).theta[0], table["q1"])
+    needed = table.drop(["q1"]).append_column("q1", REFUSED[kind])
+    with pytest.raises(LogError, match=r"column 'q1' for theta1 holds .*; expected numbers"):
+        read_log(feather(tmp_path / "log.feather", needed))
+
+
+def test_decimals_of_256_bits_are_read(tmp_path: Path) -> None:
+    table = arm(SHORT, 2).to_arrow()
+    exact = [Decimal(round(1000 * value)) / 1000 for value in table["q1"].to_pylist()]
+    decimals = table.drop(["q1"]).append_column("q1", pa.array(exact, pa.decimal256(60, 3)))
+    found = read_log(feather(tmp_path / "log.feather", decimals))
+    assert np.allclose(found.theta[0], table["q1"], atol=1e-3)
+
+
+@pytest.mark.parametrize("form", WRITERS)
+@pytest.mark.parametrize(
+    "times",
+    [
+        pa.array(np.arange(SHORT) + (1 << 50), pa.duration("s")),
+        pa.array(np.arange(SHORT) - (1 << 60), pa.duration("us")),
+        pa.array(np.arange(SHORT) + (1 << 40), pa.timestamp("s")),
+        pa.array(np.arange(SHORT) * 10 + (1 << 60), pa.timestamp("ms", "UTC")),
+        pa.array(np.arange(SHORT, dtype=np.uint64) * np.uint64(10**7) + np.uint64(1 << 63)),
+    ],
+    ids=str,
+)
+def test_times_beyond_int64_nanoseconds_are_refused(
+    form: str, times: pa.Array, tmp_path: Path
+) -> None:
+    table = arm(SHORT, 2).to_arrow().drop(["t"]).append_column("t", times)
+    path = tmp_path / "log"
+    if form == "parquet":
+        pq.write_table(table, path)
+    else:
+        feather(path, table)
+    with pytest.raises(LogError, match="a time beyond 292 years in column 't'"):
+        read_log(path)
+
+
+@pytest.mark.parametrize(
+    "options", [{"use_dictionary": False}, {"use_dictionary": True}, {"data_page_version": "2.0"}]
+)
+def test_checksums_of_parquet_pages_are_verified(options: dict[str, Any], tmp_path: Path) -> None:
+    path, frame = tmp_path / "log.parquet", arm(2000, 2)
+    stored: dict[str, Any] = {"write_page_checksum": True, "compression": "none", **options}
+    pq.write_table(frame.to_arrow(), path, row_group_size=500, **stored)
+    assert len(read_log(path)) == 2000
+    content = bytearray(path.read_bytes())
+    content[content.index(struct.pack("<d", frame["q1"][1234]))] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(LogError, match="CRC checksum"):
+        read_log(path)

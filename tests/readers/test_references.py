@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from algid.log import Log, Origin
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
 from algid.writers import FORMATS, write_log
-from tests.readers.mcaps import Cdr, joint_state, write_mcap
+from tests.readers.mcaps import Cdr, messages_of, write_mcap
 
 T = 0.01 * np.arange(300)
 THETA = np.stack([np.sin(T), np.cos(2 * T)])
@@ -56,35 +57,38 @@ def controller_state(stamp_ns: int, names: list[str], positions: list[float]) ->
     return message.put("i", 0).put("I", 0).done()
 
 
-def table(folder: Path, **columns: FloatArray) -> Path:
-    path = folder / "log.csv"
-    body = np.transpose(list(columns.values()))
-    np.savetxt(path, body, delimiter=",", header=",".join(columns), comments="", fmt="%.17g")
-    return path
+Columns = dict[str, FloatArray]
 
 
-def columns(names: str, *signals: FloatArray) -> dict[str, FloatArray]:
+def columns(names: str, *signals: FloatArray) -> Columns:
     rows = [row for signal in signals for row in np.atleast_2d(signal)]
-    return dict(zip(names.split(), rows, strict=True))
+    return dict(zip(names.split(","), rows, strict=True))
 
 
-PLAIN = columns("t theta1 theta2 tau1 tau2", T, THETA, TAU)
+PLAIN = columns("t,theta1,theta2,tau1,tau2", T, THETA, TAU)
 
 
-@pytest.mark.parametrize("names", ["q_des1 q_des2", "q_ref1 q_ref2", "target_q_0 target_q_1"])
-def test_columns_are_found_by_their_names(names: str, tmp_path: Path) -> None:
-    found = read_log(table(tmp_path, **PLAIN, **columns(names, REFERENCE)))
-    assert found.reference is not None
-    assert np.array_equal(found.reference, REFERENCE)
+def read(columns: Columns, **settings: Any) -> Log:
+    return read_log(columns, with_settings(Profile(), settings))
+
+
+def reference(log: Log) -> FloatArray:
+    assert log.reference is not None
+    return log.reference
+
+
+@pytest.mark.parametrize("names", ["q_des1,q_des2", "q_ref1,q_ref2", "target_q_0,target_q_1"])
+def test_columns_are_found_by_their_names(names: str) -> None:
+    found = read(PLAIN | columns(names, REFERENCE))
+    assert np.array_equal(reference(found), REFERENCE)
     assert np.array_equal(found.theta, THETA)  # a commanded angle is none
 
 
-def test_a_profile_names_them_and_they_are_recorded_as_the_angles_are(tmp_path: Path) -> None:
-    angles = np.degrees([THETA[0], THETA.sum(axis=0)])
-    asked = np.degrees([REFERENCE[0], REFERENCE.sum(axis=0)])
-    path = table(tmp_path, **columns("t q1 q2 tau1 tau2 one two", T, angles, TAU, asked))
+def test_a_profile_names_them_and_they_are_recorded_as_the_angles_are() -> None:
+    angles, asked = (np.degrees([signal[0], signal.sum(axis=0)]) for signal in (THETA, REFERENCE))
+    made = columns("t,q1,q2,tau1,tau2,one,two", T, angles, TAU, asked)
     unit = {"unit": "deg"}
-    settings = {
+    settings: dict[str, Any] = {
         "theta1": unit,
         "theta2": unit,
         "q_des1": {"source": "one"},
@@ -92,13 +96,10 @@ def test_a_profile_names_them_and_they_are_recorded_as_the_angles_are(tmp_path: 
         "second_angle": "absolute",
         "zero": "hanging",
     }
-    found = read_log(path, with_settings(Profile(), settings))
-    assert found.reference is not None
-    assert found.reference == pytest.approx(REFERENCE - np.array([[math.pi / 2], [0.0]]))
-    in_radians = {**settings, "q_des1": {"source": "one", "unit": "rad"}}
-    read = read_log(path, with_settings(Profile(), in_radians)).reference
-    assert read is not None
-    assert read[0] == pytest.approx(asked[0] - math.pi / 2)
+    found = reference(read(made, **settings))
+    assert found == pytest.approx(REFERENCE - np.array([[math.pi / 2], [0.0]]))
+    settings["q_des1"] = {"source": "one", "unit": "rad"}
+    assert reference(read(made, **settings))[0] == pytest.approx(asked[0] - math.pi / 2)
 
 
 @pytest.mark.parametrize(
@@ -113,38 +114,27 @@ def test_a_profile_names_them_and_they_are_recorded_as_the_angles_are(tmp_path: 
     ],
 )
 def test_the_unit_is_the_angles_where_nothing_else_is_said(
-    angle: str,
-    reference: str,
-    said: dict[str, dict[str, str]],
-    unit: str,
-    by: str,
-    tmp_path: Path,
+    angle: str, reference: str, said: dict[str, dict[str, str]], unit: str, by: str
 ) -> None:
-    of_angles = dict(zip((angle.format(1), angle.format(2)), THETA, strict=True))
-    asked = dict(zip((reference.format(1), reference.format(2)), REFERENCE, strict=True))
-    torques = dict(zip(("tau1", "tau2"), TAU, strict=True))
-    path = table(tmp_path, t=T, **of_angles, **torques, **asked)
+    names = ",".join(form.format(joint) for form in (angle, "tau{}", reference) for joint in (1, 2))
     own = {name.format(joint): one for name, one in said.items() for joint in (1, 2)}
-    read = read_log(path, with_settings(Profile(), own)).origin.reading.channels["q_des2"]
-    assert (read.unit, read.told) == (unit, by)
+    found = read(columns(f"t,{names}", T, THETA, TAU, REFERENCE), **own)
+    channel = found.origin.reading.channels["q_des2"]
+    assert (channel.unit, channel.told) == (unit, by)
 
 
-def test_one_joint_or_seven_are_no_reference(tmp_path: Path) -> None:
-    one = table(tmp_path, **PLAIN, **columns("q_des1", REFERENCE[0]))
-    assert read_log(one).reference is None
-    names = " ".join(f"q_des{joint}" for joint in range(1, 8))
-    seven = table(tmp_path, **PLAIN, **columns(names, np.tile(T, (7, 1))))
-    assert read_log(seven).reference is None
+@pytest.mark.parametrize("joints", [1, 7])
+def test_one_joint_or_seven_are_no_reference(joints: int) -> None:
+    others = {f"q_des{joint}": T for joint in range(1, joints + 1)}
+    assert read(PLAIN | others).reference is None
 
 
-def test_one_that_wraps_follows_its_angle(tmp_path: Path) -> None:
-    turning = np.stack([3 * T, THETA[1]])
-    wrapped = [np.mod(turning[0] + part, 2 * np.pi) for part in (0.0, 0.1)]
-    made = columns("t theta1 theta2 tau1 tau2", T, wrapped[0], THETA[1], TAU)
-    path = table(tmp_path, **made, **columns("q_des1 q_des2", wrapped[1], REFERENCE[1]))
-    found = read_log(path, with_settings(Profile(), {"theta1": {"unwrap": True}}))
-    assert found.reference is not None
-    assert found.reference[0] == pytest.approx(turning[0] + 0.1)
+def test_one_that_wraps_follows_its_angle() -> None:
+    turning, asked = (np.stack([3 * T + part, THETA[1]]) for part in (0.0, 0.1))
+    names = "t,theta1,theta2,tau1,tau2,q_des1,q_des2"
+    made = columns(names, T, np.mod(turning, 2 * np.pi), TAU, np.mod(asked, 2 * np.pi))
+    found = reference(read(made, theta1={"unwrap": True}))
+    assert found[0] == pytest.approx(turning[0] + 0.1)
 
 
 @pytest.mark.parametrize("kind", FORMATS)
@@ -156,8 +146,7 @@ def test_writers_keep_it_to_the_last_bit(kind: str, velocity: bool, tmp_path: Pa
     path = tmp_path / f"log.{kind}"
     write_log(path, iter([log.part(0, 100), log.part(100, 300)]))
     found = read_log(path)
-    assert found.reference is not None
-    assert np.array_equal(found.reference, REFERENCE)
+    assert np.array_equal(reference(found), REFERENCE)
     assert np.array_equal(found.theta, THETA)
     assert (found.omega is not None) == velocity
     assert found.notices == ()
@@ -166,27 +155,24 @@ def test_writers_keep_it_to_the_last_bit(kind: str, velocity: bool, tmp_path: Pa
 @pytest.mark.parametrize("field", ["reference", "desired"])
 def test_a_trajectory_controller_tells_it(field: str, tmp_path: Path) -> None:
     """At a rate of its own and for a part of the log; joints in another order; nothing is lost."""
-    messages = []
-    for step, t in enumerate(T):
-        stamp = 10**9 + step * 10_000_000
-        state = joint_state(
-            stamp, ["hip", "knee"], THETA[:, step].tolist(), (), TAU[:, step].tolist()
-        )
-        messages.append(("/joint_states", stamp, state.done()))
+    log = Log(10**9 + np.arange(300) * 10_000_000, THETA, TAU, Origin("", "", {}))
+    messages = messages_of(log, names=["hip", "knee"])
+    for step, (t, stamp) in enumerate(zip(T, log.stamp_ns.tolist(), strict=True)):
         if step % 4 == 0 and 40 <= step <= 200:
             asked = [float(REFERENCE[1, step]), t, float(REFERENCE[0, step])]
             data = controller_state(stamp, ["knee", "wrist", "hip"], asked)
             messages.append(("/arm_controller/state", stamp, data))
     kind = "control_msgs/msg/JointTrajectoryControllerState"
     schemas = {"/arm_controller/state": (kind, "ros2msg", state_definition(field))}
+    messages.sort(key=lambda one: one[1])
     write_mcap(tmp_path / "log.mcap", messages, schemas)
     found = read_log(tmp_path / "log.mcap")
     assert len(found) == len(T)
-    assert found.reference is not None
+    asked_for = reference(found)
     inside = slice(40, 201)
     # linear interpolation over 40 ms of cos 2t: at most 4 × 0.04² / 8
-    assert np.abs(found.reference[:, inside] - REFERENCE[:, inside]).max() < 8.1e-4
-    assert np.all(np.isnan(found.reference[:, :40]))
-    assert np.all(np.isnan(found.reference[:, 201:]))
+    assert np.abs(asked_for[:, inside] - REFERENCE[:, inside]).max() < 8.1e-4
+    assert np.all(np.isnan(asked_for[:, :40]))
+    assert np.all(np.isnan(asked_for[:, 201:]))
     assert not any(notice.lossy for notice in found.notices)
     assert found.origin.mapping["q_des1"] == f"/arm_controller/state: {field}.positions[2]"

@@ -1,0 +1,173 @@
+"""Tables of text: what is lost is counted or refused, and what is hostile costs nothing."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zstandard
+
+from algid.base.errors import LogError
+from algid.log import Log
+from algid.readers import read_log
+from tests.conftest import Limited
+from tests.readers.logs import noise_log
+
+N = 1000
+LOG = noise_log(N)
+NAMES = ("t", "theta1", "theta2", "tau1", "tau2")
+HEAD = ",".join(NAMES)
+VALUES = np.column_stack([LOG.t, LOG.theta.T, LOG.tau.T]).tolist()
+ROWS = [",".join(map(repr, row)) for row in VALUES]
+
+
+def read(folder: Path, *lines: str) -> Log:
+    (folder / "log.csv").write_text("\n".join(lines) + "\n")
+    return read_log(folder / "log.csv")
+
+
+def lost(log: Log) -> list[str]:
+    return [notice.text for notice in log.notices if notice.lossy]
+
+
+@pytest.mark.parametrize("row", [",,,,,", " , ,,, ,", ",,,,,x", '"","",,,,'])
+@pytest.mark.parametrize("place", [500, 900])
+def test_rows_without_a_value_are_counted(row: str, place: int, tmp_path: Path) -> None:
+    noted = [f"{one},x" for one in ROWS]
+    log = read(tmp_path, f"{HEAD},note", *noted[:place], *[row, ""] * 50, *noted[place + 50 :])
+    assert len(log) == N - 50
+    assert lost(log) == ["50 of 1,000 rows dropped for want of a value"]
+
+
+@pytest.mark.parametrize("quoted", ['"x', 'a"b', '"'])
+@pytest.mark.parametrize("closed", [True, False])
+def test_rows_between_quotes_are_refused(quoted: str, closed: bool, tmp_path: Path) -> None:
+    noted = [f"{one},x" for one in ROWS]
+    noted[500] = f"{ROWS[500]},{quoted}"
+    noted[700] = f'{ROWS[700]},x"' if closed else noted[700]
+    with pytest.raises(LogError, match=r"past row \d+: .*(quotes|malformed)|row 501 .* quotes"):
+        read(tmp_path, f"{HEAD},note", *noted)
+
+
+@pytest.mark.parametrize("note", ['"x, y"', '"x\ny"', '"x ""y"" z"', "x"])
+def test_texts_in_quotes_are_texts(note: str, tmp_path: Path) -> None:
+    log = read(tmp_path, f"{HEAD},note", *(f"{one},{note}" for one in ROWS))
+    assert len(log) == N
+    assert lost(log) == []
+
+
+@pytest.mark.parametrize(
+    "day", ["0001-01-01", "1600-02-29", "1677-09-21", "2262-04-12", "2300-01-01", "9999-12-31"]
+)
+def test_dates_beyond_int64_nanoseconds_are_refused(day: str, tmp_path: Path) -> None:
+    rows = [
+        f"{day}T00:00:{row:05.2f}Z,{line.partition(',')[2]}" for row, line in enumerate(ROWS[:50])
+    ]
+    with pytest.raises(LogError, match=r"past row 0: .*expected dates of 1678 to 2261"):
+        read(tmp_path, HEAD, *rows)
+
+
+def text_of(kind: str) -> bytes:
+    if kind == "jsonl":
+        rows = [json.dumps(dict(zip(NAMES, row, strict=True))) for row in VALUES]
+        return "\n".join([*rows, ""]).encode()
+    text = "\n".join([HEAD, *ROWS, ""])
+    return (text if kind == "csv" else text.replace(",", "  ")).encode()
+
+
+@pytest.mark.parametrize("nul", [1, 4096, 70_000, 1 << 21])
+@pytest.mark.parametrize("kind", ["csv", "blanks", "jsonl"])
+def test_rows_before_nul_bytes_are_kept_and_the_loss_is_counted(
+    kind: str, nul: int, tmp_path: Path
+) -> None:
+    whole = text_of(kind)
+    place = whole.rfind(b"\n", 0, len(whole) // 2) + 12  # in the midst of a row
+    kept = whole[:place].count(b"\n") - (kind != "jsonl")
+    path = tmp_path / f"log.{'jsonl' if kind == 'jsonl' else 'csv'}"
+    path.write_bytes(whole[:place] + bytes(nul))
+    log = read_log(path)
+    assert np.array_equal(log.theta, LOG.theta[:, :kept])
+    assert np.array_equal(log.tau, LOG.tau[:, :kept])
+    assert [(one.code, one.lossy) for one in log.notices] == [("CUT_OFF", True)]
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("kind", ["csv", "blanks"])
+def test_a_last_row_without_a_line_end_is_left_out_and_told(
+    kind: str, packed: bool, tmp_path: Path
+) -> None:
+    """Its last number may lack digits: 0.4 may have been 0.4711, or 0.4e-05."""
+    path, text = tmp_path / "log.csv", text_of(kind)[:-4]
+    path.write_bytes(gzip.compress(text) if packed else text)
+    log = read_log(path)
+    assert np.array_equal(log.tau, LOG.tau[:, :-1])
+    assert [(one.code, one.lossy) for one in log.notices] == [("CUT_OFF", True)]
+
+
+@pytest.mark.parametrize("rows", [1, 40])  # within the first bytes, and behind them
+def test_nul_bytes_among_the_rows_are_refused(rows: int, tmp_path: Path) -> None:
+    header, _, body = text_of("csv").partition(b"\n")
+    whole = header + b"\n" + rows * body
+    place = len(whole) // 2
+    path = tmp_path / "log.csv"
+    path.write_bytes(whole[:place] + bytes(500) + whole[place + 500 :])
+    with pytest.raises(LogError, match=r"line 2 has .*mend|could not parse .*; mend that row"):
+        read_log(path)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9, 0.999])
+def test_compressed_text_that_breaks_off_is_refused(share: float, tmp_path: Path) -> None:
+    for name, pack in (("log.csv.gz", gzip.compress), ("log.csv.zst", zstandard.compress)):
+        packed = pack(text_of("csv"))
+        (tmp_path / name).write_bytes(packed)
+        assert len(read_log(tmp_path / name)) == N
+        (tmp_path / name).write_bytes(packed[: int(len(packed) * share)])
+        with pytest.raises(LogError, match="damaged or cut off"):
+            read_log(tmp_path / name)
+
+
+def test_text_that_unpacks_to_more_than_any_table_is_refused(
+    tmp_path: Path, limited: Limited
+) -> None:
+    limited(free_text_bytes=1 << 24)
+    stream = zstandard.ZstdCompressor().compressobj()
+    with (tmp_path / "log.csv.zst").open("wb") as file:
+        file.write(stream.compress(text_of("csv")))
+        for _ in range(40):
+            file.write(stream.compress(b"\n" * (1 << 23)))
+        file.write(stream.flush())
+    with pytest.raises(
+        LogError, match="as no table of their size does; if it is one, unpack it first"
+    ):
+        read_log(tmp_path / "log.csv.zst")
+
+
+@pytest.mark.parametrize("columns", [5_000, 1_000_000])
+def test_countless_columns_are_refused(columns: int, tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(",".join(f"c{place}" for place in range(columns)) + "\n1\n")
+    with pytest.raises(LogError, match=r"columns|line of more than"):
+        read_log(tmp_path / "log.csv")
+
+
+def test_names_with_control_characters_do_not_break_a_message(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t,<script>x</script>,\u202eq1,tau1\n1,2,3,4\n2,3,4,5\n")
+    with pytest.raises(LogError, match="no column for") as caught:
+        read_log(tmp_path / "log.csv")
+    assert "\u202e" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "header", ["t,theta1,theta2,tau1,tau2", '"t","theta1","theta2","tau1","tau2"']
+)
+@pytest.mark.parametrize("end", ["", "\n", "\n1,2,3,4,5\n"])
+def test_lines_that_end_in_carriage_returns_alone_are_refused(
+    header: str, end: str, tmp_path: Path
+) -> None:
+    (tmp_path / "log.csv").write_bytes(("\r".join([header, *ROWS[:30]]) + end).encode())
+    with pytest.raises(LogError, match="carriage returns alone"):
+        read_log(tmp_path / "log.csv")
+    (tmp_path / "log.csv").write_bytes(("\r\n".join([header, *ROWS[:30]]) + "\r\n").encode())
+    assert len(read_log(tmp_path / "log.csv")) == 30
