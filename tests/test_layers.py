@@ -95,7 +95,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy polars pydantic pydantic_core scipy",
     ),
     "exports": room(
-        "arm compiled errors estimators identification model names notices options "
+        "arm errors estimators identification model names notices options "
         "results",
         "jinja2 numpy polars scipy",
     ),

@@ -18,10 +18,9 @@ from math import inf
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.special import stdtridf
 
 from algid import __version__
-from algid.base.compiled import student_quantile
 from algid.base.errors import ResultError, SettingError
 from algid.base.names import within
 from algid.estimators.diagnostics import bounds
@@ -37,15 +36,8 @@ from algid.results import Result
 TABLES = ("csv", "parquet")
 _HOPELESS = 100
 """Draws in a row that no arm is like, which says that the estimates are none's."""
-
-
-def freedom_of(quantile: float) -> float:
-    """Degrees of freedom of Student's t whose 95 % interval is ± `quantile`; inf if normal."""
-    least = 1e-6  # of 1 / ν, in which the quantile is all but a line
-    if quantile <= student_quantile(1 / least):
-        return inf
-    widest = min(quantile, student_quantile(2.0))
-    return 1 / float(brentq(lambda of: student_quantile(1 / of) - widest, least, 0.5, rtol=1e-10))
+_NORMAL = 1e6
+"""Degrees of freedom beyond which Student's t is all but normal."""
 
 
 def drawn_files(
@@ -79,7 +71,8 @@ def drawn_files(
     size = np.sqrt(np.diag(covariance))
     size[size == 0] = 1.0
     still, correlation = np.zeros(len(names)), covariance / np.outer(size, size)
-    freedom, random = freedom_of(result.quantile), np.random.default_rng(seed)
+    freedom, random = float(stdtridf(0.975, result.quantile)), np.random.default_rng(seed)
+    freedom = inf if freedom > _NORMAL else freedom
     shared = Shared(model, payload="m_p" in names, body=within(BODY_PARAMETERS, names))
     limits, broken = bounds(shared), list[str]()
     files: dict[str, bytes] = {"manifest.json": b""}

@@ -16,7 +16,7 @@ import algid
 from algid.arm import FloatArray, regressor
 from algid.base.compiled import student_quantile
 from algid.base.errors import ResultError, SettingError
-from algid.exports.draws import drawn_files, freedom_of
+from algid.exports.draws import drawn_files
 from algid.model import Model
 from algid.results import Result
 from tests.exports.arms import ODD, result_of, states, values_of
@@ -57,6 +57,7 @@ def test_draws_are_students_with_the_estimates_covariance() -> None:
     manifest, files = drawn(result, "parquet", count, 1)
     assert (manifest["refused"], manifest["distribution"]) == (0, "Student's t")
     assert manifest["degrees_of_freedom"] == pytest.approx(NU, rel=1e-6)
+    assert drawn(result_of(VALUE, FRICTION), "csv", 1, 0)[0]["degrees_of_freedom"] is None
     names, covariance = manifest["names"], np.array(manifest["covariance"])
     np.testing.assert_array_equal(covariance, result.covariance)
     table = pl.read_parquet(files["draws.parquet"])
@@ -73,12 +74,6 @@ def test_draws_are_students_with_the_estimates_covariance() -> None:
     np.testing.assert_allclose(found, expected, atol=4 * wide * np.sqrt((kurtosis - 1) / count))
     within = np.mean(np.abs(z) < student_quantile(NU), axis=0)
     np.testing.assert_allclose(within, 0.95, atol=4 * np.sqrt(0.95 * 0.05 / count))
-
-
-def test_the_degrees_of_freedom_are_those_of_the_interval() -> None:
-    for nu in (2.0, 3.3, 40.0, 1e4):
-        assert freedom_of(student_quantile(nu)) == pytest.approx(nu, rel=1e-6)
-    assert freedom_of(1.9599) == np.inf
 
 
 def test_every_draw_is_a_possible_arm() -> None:
