@@ -107,6 +107,7 @@ def followed(
             continue
         own = own.with_columns(expected=pl.col("value").median().over("robot", "stint"))
         found.append(standing_out(own, "outlier"))
+        own = own.drop_nulls("t")
         means.append(line(own, "robot", "stint"))
         ends = own.with_columns(month=pl.int_ranges("month", pl.col("month") + SPAN))
         ends = ends.explode("month").join(own, on=["robot", "stint", "month"], how="semi")

@@ -259,10 +259,15 @@ def test_a_file_that_is_no_table_is_refused_in_one_line(tmp_path: Path) -> None:
 def test_a_step_is_what_two_means_explain_once_in_a_million_lives(
     share: float, told: bool, tmp_path: Path
 ) -> None:
-    """Ten logs on either side: the gain is 5 (step / std)², at one of 19 places."""
+    """Ten logs on either side: the gain is 5 (step / std)², at one of 19 places.
+
+    Logs without a date are on neither side.
+    """
     gain = stats.chi2.isf(CERTAIN / 19, 1)
     step = 0.01 * math.sqrt(share * gain / 5)
-    found = history_in(tmp_path, table([1.0] * 10 + [1.0 + step] * 10)).findings.filter(kind="step")
+    jobs = table([1.0] * 10 + [1.0 + step] * 10)
+    undated = table([1.02] * 3, time=pl.Series([None] * 3, dtype=STAMP), job=["a", "b", "c"])
+    found = history_in(tmp_path, pl.concat([jobs, undated])).findings.filter(kind="step")
     assert found.height == told
     if told:
         assert found.select("job", "expected").row(0) == ("j10", pytest.approx(1.0))
