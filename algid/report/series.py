@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from algid.base.blocks import concatenated, rows_of
 from algid.base.criteria import CUT
 from algid.base.errors import ResultError
 from algid.base.progress import Progress
-from algid.base.quantiles import distinct, median
+from algid.base.quantiles import median
 
 Block = dict[str, FloatArray]
 AGAIN = "identify again with this version"
@@ -80,8 +81,9 @@ def stretches(
                 left = block[f"tau{joint}"] - block[f"tau{joint}_predicted"]
                 block[f"residual{joint}"] = left
         logs = block.setdefault("log", np.zeros(block["t"].size))
-        for log in distinct(logs).tolist():
-            yield int(log), rows_of(block, logs == log)
+        firsts = np.flatnonzero(np.diff(logs, prepend=-1)).tolist()
+        for first, last in pairwise([*firsts, logs.size]):
+            yield int(logs[first]), rows_of(block, slice(first, last))
         done += logs.size
         if progress is not None:
             progress(stage, done, total)

@@ -35,7 +35,9 @@ def test_verdict_reasons_estimates_and_fit_are_shown(result: Result) -> None:
         assert words in text
     codes = ("ONE", "TWO", "THREE", "FOUR")
     noted = [Notice(code, "said " * 90, logs=(f"{code}.csv",)) for code in codes]
+    noted.append(Notice("FIVE", "five", note=True))
     doubtful = shown(result.model_copy(update={"notices": noted}))
+    assert "Data notes (1): FIVE" in doubtful
     assert "[THREE]" in doubtful
     assert "1 more reason, with -v: FOUR" in doubtful
 
@@ -74,4 +76,6 @@ def test_the_terms_are_named(result: Result) -> None:
         fit = result.fit.model_copy(update={"model": model})
         many = {f"f{number}": result.parameters["k1"] for number in range(20 if own else 0)}
         found = {"fit": fit, "parameters": result.parameters | many}
-        assert text in shown(result.model_copy(update=found))
+        lines = shown(result.model_copy(update=found))
+        assert text in lines
+        assert ("(f0 8.1" in lines) == bool(own)

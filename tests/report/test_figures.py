@@ -82,6 +82,8 @@ def test_torque_stands_above_its_residual_and_the_worst_moment_has_every_sample(
     starts = sorted({shape["x0"] for shape in plot.layout["shapes"]})
     span = scored.filter(log=0)["t"]
     assert starts == pytest.approx([span[0], 1.01 * span[-1]])
+    words = [one["text"] for one in plot.layout["annotations"]]
+    assert words[4:] == ["case1-unloaded.mcap", "case1-loaded.mcap"]
     for joint, one in enumerate(traces(near, "residual"), start=1):
         left = (rows[f"tau{joint}"] - rows[f"tau{joint}_predicted"]).abs().fill_nan(0.0)
         t, y = typed(one["x"]), typed(one["y"])
@@ -111,6 +113,8 @@ def test_residuals_stand_against_the_band_of_white_noise(case_folder: Path) -> N
     one = rows.filter((pl.col("quantity") == "autocorrelation") & (pl.col("joint") == 1))
     stems = traces(plot, "residual")[1]
     assert finite(typed(stems["y"])[1::3]) == pytest.approx(one["value"].to_numpy(), rel=1e-5)
+    axes = [plot.layout[name]["title"]["text"] for name in plot.layout if name.startswith("x")]
+    assert axes == 2 * ["frequency, Hz", "lag, s"]
     inside = one.filter(pl.col("value").is_between(pl.col("low"), pl.col("high"))).height
     assert f"inside the band: {inside} of {one.height} and " in plot.note
     white = rows.filter((pl.col("quantity") == "whitened spectrum") & (pl.col("joint") == 1))
@@ -131,6 +135,9 @@ def test_the_running_estimate_ends_at_its_last_value(case_folder: Path, result: 
         low, high = plot.layout[axis.replace("y", "yaxis")]["range"]
         marks = {shape["y0"] for shape in plot.layout["shapes"] if shape["yref"] == axis}
         assert {result.estimates[name].estimate, known_truth(result).get(name)} - {None} <= marks
+        late, half = rows[name][rows.height // 4 :], rows[f"{name}_half"][rows.height // 4 :]
+        seen = [(late - half).min(), (late + half).max(), *marks]
+        assert high - low < 2 * (max(seen) - min(seen))
         assert low < rows[name][-1] - rows[f"{name}_half"][-1] < rows[name][-1] < high
 
 

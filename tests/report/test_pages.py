@@ -59,11 +59,15 @@ def test_the_page_leads_with_the_arm_and_its_tables_hold_the_estimates(
     assert heads[:5] == ["Parameter", "Estimate", "± 95 %", "Unit", "Status"]
     every = rows_of(result, result.parameters)
     assert [row[:5] for row in rows] == [[o.name, o.value, o.half, o.unit, o.status] for o in every]
-    assert "7 of 7 constants identified · refined estimator · 8.000 s of log" in shown.text
+    assert "<h1>case1-unloaded.mcap and 1 more</h1>" in shown.text
+    facts = "7 of 7 constants identified · refined estimator · 8.000 s of log at 1000 Hz · 8,002"
+    assert facts in shown.text
     heads, rows = shown.tables["Table 4"]
     paper = {row[0]: row[heads.index("Paper, %")] for row in rows}
     assert paper["k1"] == "0.2449"
-    assert ["velocity", "observer"] in shown.tables["Settings"][1]
+    settings = dict(shown.tables["Settings"][1])
+    assert (settings["velocity"], settings["used.terms"]) == ("observer", "plain")
+    assert not [name for name in settings if ".channels." in name]
     assert shown.tables["Torque prediction"][1][0][:2] == ["logs used", "1"]
     assert [row[1] for row in shown.tables["Whiteness of the residual"][1]] == ["yes", "yes"]
 
@@ -80,20 +84,25 @@ def test_tables_have_what_the_fit_knows(folder: Path, result: Result) -> None:
     broken = Bound(bound="k7 >= 0", value=-0.31, distance_sigma=4.04)
     known = {"residual": prediction, "terms": [tried], "broken_bounds": [broken]}
     fit = result.fit.model_copy(update={**known, "noise": {"tau1": 0.0123, "theta2": 1e-4}})
-    shown = written(folder, result.model_copy(update={"fit": fit, "estimator": "weak"}))
+    vague = result.parameters["k1"].model_copy(update={"status": Status.NOT_SIGNIFICANT})
+    every = {"fit": fit, "estimator": "weak", "parameters": {**result.parameters, "f1": vague}}
+    shown = written(folder, result.model_copy(update=every))
     rows = {title: rows for title, (_, rows) in shown.tables.items()}
     assert rows["Torque prediction"] == [
         ["logs used", "1", "0.123", "5.00", "0.99750", "0.100", "0.200", "0.0200"],
         ["logs used", "2", "2.00", "50.0", "0.75000", "1.00", "–", "–"],
     ]
     assert rows["Terms tried"] == [["rotor", "-12.3", "-2.10", "+3.3", "yes"]]
+    assert [row[0] for row in rows["Terms whose interval holds zero"]] == ["f1"]
+    assert "<h2>1 term of the torque may be zero</h2>" in shown.text
     assert rows["Noise of the logs"] == [["tau1", "0.0123", "N m"], ["theta2", "1.00e-4", "rad"]]
     assert rows["Physical bounds that are broken"] == [["k7 >= 0", "-0.3100", "4.0"]]
     assert [row[1:3] for row in rows["Logs"]] == [["unloaded", "mcap"], ["loaded", "mcap"]]
     assert {row[2] for row in rows["Channels"]} == {"all logs"}
     assert ["estimator", "weak, in place of refined"] in rows["Provenance"]
     parts = re.findall(r'<details class="part" id="([^"]*)"( open)?>', shown.text)
-    assert [key for key, opened in parts if not opened] == ["fit", "data", "settings", "paper"]
+    folded = [key for key, opened in parts if not opened]
+    assert folded == ["zero", "fit", "data", "settings", "paper"]
     leading = written(folder, result.model_copy(update={"estimator": "paper"})).text
     assert leading.index('id="paper"') < leading.index('id="torque"') < leading.index('id="fit"')
 
@@ -103,6 +112,10 @@ def test_every_figure_is_there_and_plotly_takes_it(folder: Path) -> None:
     arm = figures.pop("arm")
     assert list(figures) == FIGURES
     assert len(arm["t"]) == len(arm["theta1"]) == len(arm["theta2"]) > 100
+    layout = figures["estimates"]["layout"]
+    *axes, condition = (layout[name] for name in layout if name.startswith("yaxis"))
+    assert condition["type"] == "log"
+    assert all("range" in axis for axis in axes)
     for figure in figures.values():
         made = go.Figure(figure)  # which refuses what its script does not know
         assert len(made.data) == len(figure["data"]) > 0
@@ -198,7 +211,7 @@ def test_markdown_has_every_table_and_a_command_that_can_be_copied() -> None:
     parts = [
         Section("one", "One", [table]),
         Section("none", "None", [Table("empty", "A", ()), ()]),
-        Section("two", "Two", ["a sentence", table], folded=True),
+        Section("two", "Two", ["a sentence", Table("U", "B", [("x|z",)])], folded=True),
     ]
     text = markdown(Document(failed, parts, "a kicker", "name"))
     lines = text.splitlines()
@@ -208,7 +221,9 @@ def test_markdown_has_every_table_and_a_command_that_can_be_copied() -> None:
     assert lines[at - 1] == lines[at + 1] == ""
     before, _, after = text.partition("<details>")
     assert before.count(r"**T & Co**".replace("&", r"\&")) == 1
-    assert after.count(r"| x\|y | 1 |") == 1
+    assert r"| x\|y | 1 |" in before
+    assert "**U**" in after
+    assert r"| x\|z |" in after
     assert after.rstrip().endswith("</details>")
     assert "| :-- | --: |" in before
     assert "empty" not in text
