@@ -247,23 +247,16 @@ def _train(
             for log, outcome in zip(logs, outcomes, strict=True):
                 log.sure = outcome.noise_change < _NOISE_SETTLED
         improved = max(outcome.noise_change for outcome in outcomes)
-        settled = moved < SETTLED or _rest(earlier, moved) < _REST
+        settled = moved < SETTLED
+        if moved < earlier:
+            # Steps that shrink do so in the same ratio: what is left of the geometric series.
+            settled |= moved**2 / (earlier - moved) < _REST
         if iteration > 1 and settled and improved < _NOISE_SETTLED:
             return beta, outcomes, iteration, "settled"
     # steps within what a torque's error that matters would leave, where there is next to none
     if moved * min(1.0, max(log.relative_error for log in logs)) < _CLOSE:
         return beta, outcomes, _STEPS, "settled"
     return beta, outcomes, _STEPS, "unsettled"
-
-
-def _rest(earlier: float, moved: float) -> float:
-    """What all further steps add up to, after one `earlier` and one that has `moved` so far.
-
-    Steps that shrink do so in the same ratio: a geometric series.
-    """
-    if moved < earlier:
-        return moved**2 / (earlier - moved)
-    return np.inf
 
 
 def _overshot(step: FloatArray, before: FloatArray, S: FloatArray) -> bool:

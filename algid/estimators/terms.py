@@ -62,7 +62,7 @@ from algid.model import (
 from algid.physics.effort import ELASTIC
 from algid.physics.motion import Widths
 from algid.physics.terms import ALWAYS
-from algid.signals.segments import Segment, pieces, spread_pieces
+from algid.signals.segments import pieces, spread_pieces
 
 CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and not term.lags)
 """Terms that the logs choose from; one column serves lag and delay, equal to first order."""
@@ -185,34 +185,18 @@ def needs_shape(terms: Sequence[str]) -> bool:
     return any(not set(_using(shape.name)).isdisjoint(terms) for shape in fields(Widths))
 
 
-@dataclass(frozen=True, eq=False)
-class _Pieces:
-    """Evenly spread pieces of logs of one kind, and what models have in common of their windows."""
+_Piece = tuple[Source, dict[Hashable, Known]]
+"""Evenly spread pieces of a log, and what models have in common of their windows."""
 
-    logs: tuple[tuple[Segment, ...], ...]
-    known: tuple[dict[Hashable, Known], ...]
 
-    @classmethod
-    def of(cls, sources: Sequence[Source]) -> _Pieces:
-        """Those of one pass over each of the logs, or of some, evenly spread."""
-        logs = []
-        for source in evenly_spread(sources, _MOST_LOGS):
-            every = pieces(source(), _PIECE_SAMPLES)
-            logs.append(tuple(spread_pieces(every, _PIECES, _PIECE_SAMPLES)[0]))
-        return cls(tuple(logs), tuple({} for _ in logs))
-
-    @property
-    def sources(self) -> list[Source]:
-        """The pieces as a pass gives them."""
-        return [partial(tuple, log) for log in self.logs]
-
-    def normals(self, settings: WeakSettings, at: FloatArray | None) -> list[weak.Normal]:
-        """Normal equations of the logs that are long enough, linearised `at` coefficients (q,)."""
-        every = [
-            weak.normal_equations(source, settings, at, known)
-            for source, known in zip(self.sources, self.known, strict=True)
-        ]
-        return [normal for normal in every if normal is not None]
+def _spread(sources: Sequence[Source]) -> list[_Piece]:
+    """Pieces of one pass over each of the logs of one kind, or of some, evenly spread."""
+    logs: list[_Piece] = []
+    for source in evenly_spread(sources, _MOST_LOGS):
+        every = pieces(source(), _PIECE_SAMPLES)
+        kept = tuple(spread_pieces(every, _PIECES, _PIECE_SAMPLES)[0])
+        logs.append((partial(tuple, kept), {}))
+    return logs
 
 
 Elastic = Mapping[bool, Mapping[str, float]]
@@ -220,7 +204,7 @@ Elastic = Mapping[bool, Mapping[str, float]]
 
 
 def _start(
-    kinds: Sequence[_Pieces], settings: WeakSettings, elastic: Elastic
+    kinds: Sequence[Sequence[_Piece]], settings: WeakSettings, elastic: Elastic
 ) -> tuple[Model, dict[bool, FloatArray]]:
     """Widths of friction, and coefficients of the first terms, by windows; loaded logs' apart.
 
@@ -242,7 +226,8 @@ def _start(
             if bool(loaded) in elastic:
                 at_first = vector(model.names, elastic[bool(loaded)], otherwise=0.0)
             beside_delay = replace(settings, model=model, estimate_delay=True)
-            normals = own.normals(beside_delay, at_first)
+            made = [weak.normal_equations(log, beside_delay, at_first, known) for log, known in own]
+            normals = [normal for normal in made if normal is not None]
             if normals:
                 c, _ = weak.solve(normals)
                 grams = np.stack([normal.gram.sum(axis=0) for normal in normals])
@@ -545,7 +530,7 @@ def select(
     TooShortError
         If no log is long enough for a window, or for the likelihood.
     """
-    logs = [_Pieces.of(problem.unloaded), _Pieces.of(problem.loaded)]
+    logs = [_spread(problem.unloaded), _spread(problem.loaded)]
     chosen, elastic = _selected(logs, problem, candidates, kept, absent, {})
     if elastic:  # what rigid joints have for friction's width is not theirs
         again, _ = _selected(logs, problem, candidates, kept, absent, elastic)
@@ -555,7 +540,7 @@ def select(
 
 
 def _selected(
-    kinds: Sequence[_Pieces],
+    kinds: Sequence[Sequence[_Piece]],
     problem: Problem,
     candidates: Sequence[str],
     kept: Sequence[str],
@@ -567,7 +552,8 @@ def _selected(
     shapes, start = _start(kinds, settings, elastic)
     every = replace(shapes, terms=tuple(name for name, term in TERMS.items() if not term.lags))
     shared = Shared(every, delay=True)
-    some = replace(problem, unloaded=kinds[0].sources, loaded=kinds[1].sources)
+    unloaded, loaded = ([log for log, _ in own] for own in kinds)
+    some = replace(problem, unloaded=unloaded, loaded=loaded)
     logs = [log for log in opened(some, shared) if log.loaded in start]
     driven = [
         any(np.any(piece.tau[joint]) for log in logs for piece in log.kept) for joint in (0, 1)

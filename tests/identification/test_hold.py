@@ -19,17 +19,16 @@ SEED = 312  # an arm that nothing was tuned on
 FARTHEST = 3.6  # standard deviations: of seven right ones the largest is beyond in one of 450 logs
 
 
-def moved(held: bool, rate: float = 1000.0, late: int = 0) -> tuple[Log, FloatArray]:
-    """A log of 2 s of a wide torque, and k1 … k7; the torque is logged `late` samples early."""
+def moved(held: bool) -> tuple[Log, FloatArray]:
+    """A log of 2 s of a wide torque, and k1 … k7."""
     k = random_arm(SEED)[0].constants()
-    t = np.arange(round(2 * rate) + 1) / rate
+    t = np.arange(2001) * 1e-3
     wide = wide_multi_sine(random_arm(SEED)[0], SEED)
     motion = simulate(k, SampledTorque(t, wide(t), "zoh") if held else wide, t)
     rng = np.random.default_rng(SEED)
     theta = motion.theta + 1e-3 * rng.standard_normal(motion.theta.shape)
     tau = wide(t) + 1e-2 * rng.standard_normal(motion.tau.shape)
-    count = t.size - late
-    return Log.from_arrays(t[:count], theta[:, :count], tau[:, late:]), k
+    return Log.from_arrays(t, theta, tau), k
 
 
 @pytest.mark.parametrize("held", [True, False], ids=["held", "even"])
@@ -52,15 +51,6 @@ def test_a_log_tells_its_hold(held: bool) -> None:
     assert other.fit is not None
     assert other.fit.torque_hold is not None
     assert other.fit.torque_hold.asked == other.fit.torque_hold.used != hold.used
-
-
-def test_a_delay_of_some_samples_is_a_delay() -> None:
-    log, _ = moved(held=False, late=4)
-    result = identify(log, report=False)
-    assert result.fit is not None
-    assert result.fit.torque_hold is not None
-    assert result.fit.torque_hold.used == "foh"
-    assert result.parameters["delay"].estimate == pytest.approx(4e-3, abs=2e-4)
 
 
 def test_where_a_log_does_not_tell_the_intervals_hold_both() -> None:

@@ -11,7 +11,6 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from algid.arm import FloatArray, forward_dynamics, regressor, with_payload
-from algid.base.errors import ResultError
 from algid.identification.identify import identify
 from algid.identification.open_logs import open_source
 from algid.identification.recordings import Recordings, Role
@@ -159,16 +158,3 @@ def test_a_result_predicts_logs_of_both_roles(
     bad = validate(predictor_of(weighed, "r"), swapped).total
     assert bad is not None
     assert bad.rmse[0] > 3 * SIGMA
-
-
-def test_a_prediction_without_a_constant_is_refused_by_the_results_own_file(
-    weighed: Result,
-) -> None:
-    bare = weighed.model_copy(update={"payload": {}})
-    judge = predictor_of(bare, "arm.algid/result.json")
-    log = logged(moved(3), 12).part(0, 400)
-    validate(judge, survey((log, "unloaded")))
-    with pytest.raises(
-        ResultError, match=r"^arm\.algid/result\.json: the result has no m_p; ident"
-    ):
-        validate(judge, survey((log, "loaded")))
