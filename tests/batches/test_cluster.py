@@ -15,8 +15,9 @@ import polars as pl
 import pytest
 
 import algid
+from algid.base.errors import SettingError
 from algid.base.stores import open_store
-from algid.batches.cluster import job_of
+from algid.batches.cluster import cluster, job_of
 from algid.batches.job import Task
 from algid.batches.jobs import Job
 from algid.batches.run import Batch
@@ -71,6 +72,19 @@ def test_a_worker_runs_jobs_of_its_own_version_that_see_the_output(tmp_path: Pat
     )
     told = str(run(algid.__version__, Path("/there/.jobs"), calls.add))
     assert told.endswith("does not see /there; choose a place with -o that all machines see")
+
+
+def test_calls_run_on_the_workers_that_there_are(dask: Dask, tmp_path: Path) -> None:
+    with (
+        pytest.raises(SettingError, match=f"{dask.address}: it has no workers; start dask worker"),
+        cluster(dask.address, tmp_path, None),
+    ):
+        pass
+    dask.worker()
+    with cluster(dask.address, tmp_path, None) as (submit, slots):
+        assert slots == 2
+        assert submit(calls.add, 1, 1).result(timeout=60) == 2
+        assert "as asked" in str(submit(calls.fail).result(timeout=60))
 
 
 def test_no_secret_is_in_what_dask_prints_of_a_call() -> None:

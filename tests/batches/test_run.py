@@ -21,9 +21,9 @@ from algid.base.stores import open_store
 from algid.base.verdict import Verdict
 from algid.batches.discover import jobs_of
 from algid.batches.job import Task
-from algid.batches.jobs import JobStatus
+from algid.batches.jobs import Job, JobStatus
 from algid.batches.run import Batch, Batched, locked
-from algid.batches.workers import WorkerDiedError
+from algid.batches.workers import CallFailedError, WorkerDiedError
 from algid.identification.identify import identify
 from algid.notices import Notice
 from algid.results import Result
@@ -212,3 +212,31 @@ def test_a_result_that_must_not_be_used_is_a_failure_with_its_first_reason_and_i
         "good",
         "reservations",
     )
+
+
+def test_a_watch_takes_logs_once_they_stay_as_they_are_and_tells_a_trouble_once(
+    logs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks, told = 0, list[str]()
+
+    def fail(_name: str) -> None:
+        raise CallFailedError("as asked")
+
+    def look() -> list[Job]:
+        nonlocal looks
+        looks += 1
+        if looks in (5, 6):
+            raise SettingError("away")
+        if looks == 7:
+            batch.stop.set()
+        if looks < 4:
+            (logs / "growing.csv").write_text("x" * looks)
+        return jobs_of([str(logs)], "out")
+
+    monkeypatch.setattr("algid.batches.run.LOOK_EVERY", 0.0)
+    (logs / "empty.csv").touch()
+    here = Here(fail)
+    batch = batch_of(logs.parent / "out", here)
+    batch.watch(look, complain=told.append)
+    assert here.ran == ["bad", "r1/a", "r1/b", "growing"]
+    assert told == ["away"]
