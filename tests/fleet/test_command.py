@@ -15,6 +15,7 @@ import pytest
 from click.testing import CliRunner
 from scipy.stats import norm
 
+from algid.api.report import report
 from algid.base.stores import open_store
 from algid.batches.discover import jobs_of
 from algid.batches.job import Task
@@ -121,8 +122,9 @@ def test_the_page_is_two_tables_and_a_figure_and_leads_to_reports(tmp_path: Path
     for job in ("r0/9", "r0/0", "r1/3"):
         (batch / f"{job}.algid").mkdir(parents=True)
         (batch / f"{job}.algid/report.html").write_text("a report")
-    done = CliRunner().invoke(app, ["report", str(batch), "-o", str(tmp_path / "page")])
-    assert done.exit_code == 0, done.output
+    heard = list[tuple[str, int, int]]()
+    report([batch], out=tmp_path / "page", progress=lambda *step: heard.append(step))
+    assert heard == [("following", 0, 2), ("following", 1, 2)]
     page = Page((tmp_path / "page/fleet.html").read_text(encoding="utf-8"))
     assert list(page.tables) == ["Findings", "Robots"]
     assert list(page.figures) == ["logs"]
