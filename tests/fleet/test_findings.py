@@ -264,13 +264,13 @@ def test_a_step_is_what_two_means_explain_once_in_a_million_lives(
     Logs without a date are on neither side.
     """
     gain = stats.chi2.isf(CERTAIN / 19, 1)
-    step = 0.01 * math.sqrt(share * gain / 5)
-    jobs = table([1.0] * 10 + [1.0 + step] * 10)
-    undated = table([1.02] * 3, time=pl.Series([None] * 3, dtype=STAMP), job=["a", "b", "c"])
+    step = 10.0 * math.sqrt(share * gain / 5)
+    jobs = table([100.0] * 10 + [100.0 + step] * 10, 10.0)
+    undated = table([120.0] * 3, 10.0, time=pl.Series([None] * 3, dtype=STAMP), job=["a", "b", "c"])
     found = history_in(tmp_path, pl.concat([jobs, undated])).findings.filter(kind="step")
     assert found.height == told
     if told:
-        assert found.select("job", "expected").row(0) == ("j10", pytest.approx(1.0))
+        assert found.select("job", "expected").row(0) == ("j10", pytest.approx(100.0))
         assert found["value"][0] == pytest.approx(step, rel=1e-9)
 
 
