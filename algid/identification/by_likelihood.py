@@ -77,44 +77,38 @@ def choose_model(
     LogError
         If no log is long enough.
     """
-    asked, hold_by = settings.torque_hold, _BY_SETTINGS
+    asked = settings.torque_hold
+    hold_by: Literal["logs", "settings", "parameters"] = "settings"
+    by_logs = asked == "auto" and earlier is None and settings.delay == 0
+    by_logs &= not any(EVERY_TERM[term].timing for term in settings.terms)
     if asked == "auto" and earlier is not None:
         asked, hold_by = Settings.of(earlier.settings).torque_hold, "parameters"
     hold: Hold = "zoh" if asked == "zoh" else "foh"
     if settings.chooses and earlier is not None:
-        terms = model_of(earlier).terms + within(DELAYS, earlier.parameters)
-        chosen = replace(_given(model_of(earlier), terms), chosen_by="parameters")
-        return replace(chosen, hold=hold, hold_by=hold_by)
-    by_logs = settings.torque_hold == "auto" and earlier is None and settings.delay == 0
-    by_logs &= not any(EVERY_TERM[term].timing for term in settings.terms)
-    if not (settings.chooses or by_logs or needs_shape(settings.terms)):
-        plain = Model(gravity=settings.gravity)
-        return replace(_given(plain, settings.terms), hold=hold, hold_by=hold_by)
-    with long_enough(survey):
-        chosen = _by_first_pass(survey, settings, hold)
-        if by_logs and chosen.model.lag_name is None and not (chosen.refuted and settings.chooses):
-            return _with_hold(survey, settings, chosen)
-        return replace(chosen, hold_by=hold_by)
+        model = model_of(earlier)
+        chosen = _given(model, model.terms + within(DELAYS, earlier.parameters))
+        chosen = replace(chosen, chosen_by="parameters")
+    elif not (settings.chooses or by_logs or needs_shape(settings.terms)):
+        chosen = _given(Model(gravity=settings.gravity), settings.terms)
+    else:
+        with long_enough(survey):
+            chosen = _by_first_pass(survey, settings, hold)
+            late = chosen.late
+            by_logs &= chosen.model.lag_name is None and not (chosen.refuted and settings.chooses)
+            if by_logs and late is not None:
+                hold, hold_by = late.hold, "logs"
+                if hold == "zoh":
+                    chosen = replace(_by_first_pass(survey, settings, hold), late=late)
+                elif not late.determined and not chosen.delay:
+                    why = _OF_CONTROLLER if late.faster else _OF_HOLD
+                    trials = [trial for trial in chosen.trials if trial.term not in DELAYS]
+                    trials += [TermTrial(term, True, np.nan, why) for term in DELAYS]
+                    chosen = replace(chosen, delay=True, trials=tuple(trials))
+    return replace(chosen, hold=hold, hold_by=hold_by)
 
 
-_BY_SETTINGS: Literal["settings", "parameters"] = "settings"
 _OF_HOLD = "kept: the logs leave open whether the torque is held, half a sample late"
 _OF_CONTROLLER = "kept: the logs leave open how late a controller that is faster than they are acts"
-
-
-def _with_hold(survey: Recordings, settings: Settings, chosen: Selection) -> Selection:
-    """The model and the hold that the logs show."""
-    late = chosen.late
-    if late is None:
-        return chosen
-    if late.hold == "zoh":
-        chosen = _by_first_pass(survey, settings, "zoh")
-    elif not late.determined and not chosen.delay:
-        why = _OF_CONTROLLER if late.faster else _OF_HOLD
-        trials = [trial for trial in chosen.trials if trial.term not in DELAYS]
-        trials += [TermTrial(term, True, np.nan, why) for term in DELAYS]
-        chosen = replace(chosen, delay=True, trials=tuple(trials))
-    return replace(chosen, hold=late.hold, hold_by="logs", late=late)
 
 
 def _by_first_pass(survey: Recordings, settings: Settings, hold: Hold) -> Selection:
