@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
-
-import pytest
-
-import algid
+from algid.base.verdict import Verdict
 from algid.notices import Notice
-from algid.report.terminal import WIDTH, brief
+from algid.report.terminal import WIDTH, brief, verdict_lines
 from algid.results import Result
 from algid.results.model import TorqueModel
-from algid.settings import Settings
-from algid.synth.sensors import Sensors
 
 MOST = 28
 """Lines: a verdict of three, three reasons of two each, a row an estimate, terms and notes."""
@@ -42,30 +36,19 @@ def test_verdict_reasons_estimates_and_fit_are_shown(result: Result) -> None:
     assert "1 more reason, with -v: FOUR" in doubtful
 
 
-@pytest.mark.parametrize("estimator", ["weak", "paper"])
-def test_a_simulated_log_shows_its_errors(estimator: str) -> None:
-    logs = algid.synthesise("case1", duration=3.0, torque="wide", sensors=Sensors(1e-3, 1e-2))
-    text = shown(algid.identify(*logs, settings=Settings(estimator=estimator)))
-    assert "gravity moment of link 1" in text  # the longest meaning breaks, and is not left out
+def test_a_simulated_log_shows_its_errors_and_a_long_meaning_breaks(result: Result) -> None:
+    text = shown(result)
+    assert "gravity moment of link 1" in text
     _, numbers = text.split("\n\n")
     errors = [line[34:42] for line in numbers.splitlines() if line.startswith(("k", "m_p", "l"))]
-    assert len(errors) >= 9
+    assert len(errors) == 9
     assert all(error.endswith(" %") for error in errors)
 
 
-def test_a_failed_log_says_what_to_run_first() -> None:
-    log, _ = algid.synthesise("case1", duration=3.0, torque="wide", sensors=Sensors(1e-3, 1e-2))
-    log.theta[1] *= -1
-    log = algid.Log.from_arrays(log.t, log.theta, log.tau, name="runs/of may/arm 1.csv")
-    found = algid.identify(log, settings=Settings(estimator="weak"), zero="hanging", start=0.1)
-    text = shown(found)
-    assert text.startswith("Failed: ")
-    (command,) = [line for line in text.splitlines() if line.startswith("Run first: ")]
-    words = shlex.split(command.removeprefix("Run first: "))
-    assert words[:3] == ["algid", "identify", "runs/of may/arm 1.csv"]
-    for flags in (["--estimator", "weak"], ["--zero", "hanging"], ["--start", "0.1"]):
-        place = words.index(flags[0])
-        assert words[place : place + 2] == flags
+def test_the_command_to_run_first_is_one_line_to_be_copied() -> None:
+    command = "algid identify 'runs/of may/arm 1.csv' --zero hanging " + 9 * "--force "
+    lines = verdict_lines(Verdict("failed", "it failed", command=command))
+    assert lines == ["Failed: it failed.", f"Run first: {command}"]
 
 
 def test_the_terms_are_named(result: Result) -> None:

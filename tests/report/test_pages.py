@@ -26,6 +26,7 @@ from algid.results import (
     Status,
     TermCriterion,
     TorquePrediction,
+    WhitenessTest,
     read_result,
     write_result,
 )
@@ -66,10 +67,10 @@ def test_the_page_leads_with_the_arm_and_its_tables_hold_the_estimates(
     paper = {row[0]: row[heads.index("Paper, %")] for row in rows}
     assert paper["k1"] == "0.2449"
     settings = dict(shown.tables["Settings"][1])
-    assert (settings["velocity"], settings["used.terms"]) == ("observer", "plain")
+    used = [settings[f"used.{name}"] for name in ("terms", "torque_hold")]
+    assert [settings["velocity"], *used] == ["observer", "plain", "foh"]
     assert not [name for name in settings if ".channels." in name]
     assert shown.tables["Torque prediction"][1][0][:2] == ["logs used", "1"]
-    assert [row[1] for row in shown.tables["Whiteness of the residual"][1]] == ["yes", "yes"]
 
 
 def test_tables_have_what_the_fit_knows(folder: Path, result: Result) -> None:
@@ -83,6 +84,9 @@ def test_tables_have_what_the_fit_knows(folder: Path, result: Result) -> None:
     )
     broken = Bound(bound="k7 >= 0", value=-0.31, distance_sigma=4.04)
     known = {"residual": prediction, "terms": [tried], "broken_bounds": [broken]}
+    known["cross_validation"] = prediction.model_copy(update={"rmse_rest": None})
+    test = WhitenessTest(white=False, p_value=0.01234, lag1_correlation=0.5)
+    known["whiteness"] = {"tau1": test}
     fit = result.fit.model_copy(update={**known, "noise": {"tau1": 0.0123, "theta2": 1e-4}})
     vague = result.parameters["k1"].model_copy(update={"status": Status.NOT_SIGNIFICANT})
     every = {"fit": fit, "estimator": "weak", "parameters": {**result.parameters, "f1": vague}}
@@ -91,15 +95,20 @@ def test_tables_have_what_the_fit_knows(folder: Path, result: Result) -> None:
     assert rows["Torque prediction"] == [
         ["logs used", "1", "0.123", "5.00", "0.99750", "0.100", "0.200", "0.0200"],
         ["logs used", "2", "2.00", "50.0", "0.75000", "1.00", "–", "–"],
+        ["each log by the others", "1", "0.123", "5.00", "0.99750", "–", "–", "–"],
+        ["each log by the others", "2", "2.00", "50.0", "0.75000", "–", "–", "–"],
     ]
     assert rows["Terms tried"] == [["rotor", "-12.3", "-2.10", "+3.3", "yes"]]
     assert [row[0] for row in rows["Terms whose interval holds zero"]] == ["f1"]
     assert "<h2>1 term of the torque may be zero</h2>" in shown.text
     assert rows["Noise of the logs"] == [["tau1", "0.0123", "N m"], ["theta2", "1.00e-4", "rad"]]
+    assert rows["Whiteness of the residual"] == [["tau1", "no", "0.012", "0.500"]]
     assert rows["Physical bounds that are broken"] == [["k7 >= 0", "-0.3100", "4.0"]]
     assert [row[1:3] for row in rows["Logs"]] == [["unloaded", "mcap"], ["loaded", "mcap"]]
     assert {row[2] for row in rows["Channels"]} == {"all logs"}
-    assert ["estimator", "weak, in place of refined"] in rows["Provenance"]
+    origin = dict(rows["Provenance"])
+    assert origin["estimator"] == "weak, in place of refined"
+    assert origin["sha256 of case1-unloaded.mcap"] == result.log.sha256
     parts = re.findall(r'<details class="part" id="([^"]*)"( open)?>', shown.text)
     folded = [key for key, opened in parts if not opened]
     assert folded == ["zero", "fit", "data", "settings", "paper"]
