@@ -175,7 +175,9 @@ def batch(
 
     jobs = [] if watch else look()
     if not (jobs or watch):
-        raise SettingError(f"{' '.join(names)}: expected logs in MCAP, Parquet or CSV, found none")
+        raise SettingError(
+            f"{' '.join(names) or 'batch'}: expected logs in MCAP, Parquet or CSV, found none"
+        )
     if part is not None:
         number, count = map(int, part.split("/"))
         if watch or not 1 <= number <= count:

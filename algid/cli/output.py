@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from rich.segment import Segment
 
     from algid.api import Answer
-    from algid.report.document import Document, Table
 
 
 def printable(text: str) -> str:
@@ -78,35 +77,30 @@ def shown(answer: Answer, json: bool, quiet: bool) -> None:
         complain(line)
     if quiet:
         return
+    parts = answer.shown
     if json and answer.json is not None:
-        say(answer.json().rstrip())
-    else:
-        for part in answer.shown:
-            _print(part)
+        parts = [answer.json().rstrip()]
+    for part in parts:
+        if isinstance(part, Manual) and sys.stdout.isatty():
+            from rich.markdown import Markdown
+
+            console(width=min(console().width, 120)).print(Markdown(part))
+        elif isinstance(part, Manual):
+            print(part, end="")  # its examples of credentials are none
+        elif isinstance(part, str):
+            say(part)
+        else:
+            from algid.report.document import Table
+            from algid.report.terminal import print_document, print_table
+
+            terminal = console()
+            if isinstance(part, Table):
+                print_table(part, terminal)
+                terminal.print()
+            else:
+                print_document(part, terminal)
     for line in answer.remarks:
         remark(line)
-
-
-def _print(part: Document | Table | str) -> None:
-    if isinstance(part, Manual):
-        if not sys.stdout.isatty():
-            print(part, end="")  # its examples of credentials are none
-            return
-        from rich.markdown import Markdown
-
-        console(width=min(console().width, 120)).print(Markdown(part))
-    elif isinstance(part, str):
-        say(part)
-    else:
-        from algid.report.document import Table
-        from algid.report.terminal import print_document, print_table
-
-        terminal = console()
-        if isinstance(part, Table):
-            print_table(part, terminal)
-            terminal.print()
-        else:
-            print_document(part, terminal)
 
 
 @contextmanager

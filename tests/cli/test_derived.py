@@ -160,7 +160,7 @@ OWN: dict[str, tuple[tuple[str, ...], ...]] = {
         ("--part=1/2", "--watch"),
     ),
     "identify": (*((f"--name={text}",) for text in ("", "../../evil", "..")),),
-    "export": (("--flange=0.1,0",), ("--flange=0,0,0",)),
+    "export": (("--flange=0.1,0",), ("--flange=0,0,0",), ("--to=csv",)),
 }
 
 
@@ -191,6 +191,7 @@ def test_text_that_means_nothing_is_one_line_that_names_its_flag(
         ("identify", ("--export=mcap", "--no-report")),
         ("identify", ("--effort=external", "--gravity=9.7")),
         ("batch", ("-o", "")),
+        ("report", ("-o", "pages")),
         ("design", ()),
     ],
 )
@@ -246,6 +247,7 @@ def test_help_has_every_keyword_the_example_and_the_exit_codes(name: str) -> Non
 
 def test_identify_shows_ten_everyday_options_and_a_line_each() -> None:
     lines = call("identify", "--help").out.splitlines()
+    assert lines[0] == "Usage: algid identify [OPTIONS] UNLOADED..."
     assert len(lines) <= 90
     everyday = lines[lines.index("Options:") + 1 : lines.index("Advanced:") - 1]
     assert len(everyday) == 10
@@ -337,6 +339,11 @@ def test_tables_of_the_guide_and_the_readme_are_those_of_the_code() -> None:
         (lambda: algid.export("none", "step"), "--to"),  # type: ignore[arg-type]
         (lambda: algid.export("none", "c", m1=float("nan")), "--set m1"),
         (lambda: algid.compare("none"), "compare"),
+        (lambda: algid.compare("a", "b", labels=["c"]), "labels: expected 2, found 1"),
+        (lambda: algid.inspect({}, write_profile="a.toml"), "--write-profile"),
+        (lambda: algid.batch([], "out"), "batch: expected logs"),
+        (lambda: algid.synthesise("example", rate=100.0), "--rate: the example is always"),
+        (lambda: algid.synthesise("case1", rate=1e6, duration=1e6), "--duration: .* samples"),
         (lambda: algid.design("case1", margin=0.9), "--set margin"),
         (lambda: algid.design("case1", range=1, torque=1, speed=(1, 2, 3)), "--speed"),
         (lambda: algid.synthesise("case1", drop=2.0), "--set drop"),

@@ -143,8 +143,39 @@ def test_results_are_named_by_what_tells_them_apart(tmp_path: Path) -> None:
     )
 
 
+def test_a_batch_says_what_it_ran_anew_and_what_it_passed_over() -> None:
+    anew, torn = {"other settings": 2}, {"b.json": "torn"}
+    told = answer(Batched([GOOD], 1, 0, None, torn, anew, "out", links=["mon"]), {})
+    assert next(iter(told.shown)) == "run anew: 2 other settings"
+    record, links = told.complaints
+    assert record == "out/b.json: no record of a job (torn); it counts as none: remove it"
+    assert links == ("links to folders are not entered (mon); name what they lead to as sources")
+    assert told.exit == 0
+
+
+def test_commands_say_where_their_files_are(
+    result: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for of, to, file in (
+        (result, "c", "case1-unloaded.c"),
+        (result / "result.json", "python", "case1_unloaded.py"),  # as Python imports it
+    ):
+        done = call("export", of, "--to", to)
+        assert (done.code, done.out) == (0, "")
+        assert done.err.endswith(f"wrote {file}\n")
+        assert Path(file).is_file()
+    done = call("compare", result, result, "-o", ".")
+    assert (done.code, done.err) == (0, "wrote compare.html\n")
+    assert Path("compare.html").is_file()
+    again = ("--estimator", "weak", "--no-report", "-v")
+    done = call("identify", result.with_suffix(".mcap"), *again)
+    assert done.err.endswith("wrote case1-unloaded.algid\n")
+    assert done.out == call("report", "case1-unloaded.algid").out
+
+
 def test_a_batch_beside_an_arms_result_takes_its_logs_for_loaded_ones(
-    result: Path, tmp_path: Path
+    result: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     copyfile(result.parent / "case1-loaded.mcap", tmp_path / "monday.mcap")
     quick = ("--estimator", "weak", "--workers", "1", "--no-report")
@@ -152,6 +183,9 @@ def test_a_batch_beside_an_arms_result_takes_its_logs_for_loaded_ones(
     assert done.code == 0, done.out
     found = algid.read_result(tmp_path / "out" / "monday.algid").payload["m_p"]
     assert found.estimate == pytest.approx(0.3515, rel=0.05)
+    monkeypatch.chdir(tmp_path)
+    assert call("export", "out/monday.algid", "--to", "payload").code == 0
+    assert Path("monday-payload.yaml").is_file()
 
 
 def test_a_profile_that_is_there_is_refused_before_the_log_is_read(tmp_path: Path) -> None:
