@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
 from algid.log import Log
@@ -162,3 +163,33 @@ def test_the_four_that_move_furthest_are_named() -> None:
     assert (moving(a=1, b=2, c=3, d=4, e=5, f=6) or "").endswith(
         "joint of d by 4 rad, joint of c by 3 rad and 2 more"
     )
+
+
+@pytest.mark.parametrize(
+    ("position", "effort", "names"),
+    [
+        ("q{}_deg", "tau{}", ("1", "2", "3", "4")),
+        *(
+            (position, effort, ("base", "shoulder", "elbow", "wrist"))
+            for position, effort in (
+                ("/joint_states/{}/position", "/joint_states/{}/effort"),
+                ("{}_pos", "{}_torque"),
+            )
+        ),
+    ],
+)
+def test_other_joints_of_a_table_that_move_are_told_by_their_names(
+    position: str, effort: str, names: tuple[str, ...], tmp_path: Path
+) -> None:
+    """The first is held, the last turns through 0.6 rad; the two between are those to read."""
+    t = np.arange(400) * 0.01
+    swing = np.sin(2 * t)
+    angles = np.stack([np.full(t.size, 0.7), swing, np.cos(3 * t), 0.3 * swing])
+    columns = {"time": t, "/joint_commands/gripper/position": swing}  # no joint of this topic
+    degrees = 180 / np.pi if "deg" in position else 1.0
+    for form, rows in ((position, angles * degrees), (effort, 0.1 * angles)):
+        columns |= {form.format(name): row for name, row in zip(names, rows, strict=True)}
+    pl.DataFrame(columns).write_csv(tmp_path / "log.csv")
+    log = read_log(tmp_path / "log.csv", Profile(joints=(names[1], names[2])))
+    (text,) = (one.text for one in log.notices if one.code == "OTHER_JOINTS")
+    assert f"1 other joint moves meanwhile: {names[3]} by 0.6 rad" in text

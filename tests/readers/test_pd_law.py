@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -18,20 +16,17 @@ LAWS = {
 }
 
 
-def written(folder: Path, *, velocities: bool = True) -> tuple[Path, np.ndarray]:
-    """A log in degrees without torques, and the torques (2, N) of its law in N m."""
-    t = np.arange(200) * 0.01
-    theta = np.stack([np.sin(t), np.cos(2 * t)])
-    omega = np.stack([np.cos(t), -2 * np.sin(2 * t)])
-    command = theta + 0.1 * np.stack([np.sin(3 * t), np.sin(5 * t)])
-    names = ["t", "q1", "q2", "command1", "command2"]
-    columns = [t, *np.degrees(theta), *np.degrees(command)]
-    if velocities:
-        names, columns = [*names, "dq1", "dq2"], [*columns, *np.degrees(omega)]
-    path = folder / "pd.csv"
-    np.savetxt(path, np.transpose(columns), delimiter=",", header=",".join(names), comments="")
-    gains = np.array([KP, KD])[:, :, None]
-    return path, gains[0] * (command - theta) - gains[1] * omega
+T = np.arange(200) * 0.01
+THETA = np.stack([np.sin(T), np.cos(2 * T)])
+OMEGA = np.stack([np.cos(T), -2 * np.sin(2 * T)])
+COMMAND = THETA + 0.1 * np.stack([np.sin(3 * T), np.sin(5 * T)])
+TAU = np.diag(KP) @ (COMMAND - THETA) - np.diag(KD) @ OMEGA
+"""Torques (2, N) of the law in N m."""
+DEGREES = dict(
+    zip(("q1", "q2", "command1", "command2"), np.degrees([*THETA, *COMMAND]), strict=True)
+)
+STILL: dict[str, np.ndarray] = {"t": T, **DEGREES}
+LOG = STILL | dict(zip(("dq1", "dq2"), np.degrees(OMEGA), strict=True))
 
 
 def profile(**settings: object) -> Profile:
@@ -40,17 +35,13 @@ def profile(**settings: object) -> Profile:
     return with_settings(Profile(), {**angles, **LAWS, **settings})
 
 
-def test_a_torque_is_made_of_a_desired_angle(tmp_path: Path) -> None:
-    path, tau = written(tmp_path)
-    assert np.allclose(read_log(path, profile()).tau, tau, atol=1e-9)
+def test_a_torque_is_made_of_a_desired_angle() -> None:
+    assert np.allclose(read_log(LOG, profile()).tau, TAU, atol=1e-9)
 
 
-def test_a_joint_that_counts_the_other_way_has_its_law_in_its_own_coordinates(
-    tmp_path: Path,
-) -> None:
-    path, tau = written(tmp_path)
+def test_a_joint_that_counts_the_other_way_has_its_law_in_its_own_coordinates() -> None:
     turned = profile(signs=(-1, 1), offsets=(0.3, 0.0), zero="hanging")
-    assert np.allclose(read_log(path, turned).tau, [[-1], [1]] * tau, atol=1e-9)
+    assert np.allclose(read_log(LOG, turned).tau, [[-1], [1]] * TAU, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -61,12 +52,9 @@ def test_a_joint_that_counts_the_other_way_has_its_law_in_its_own_coordinates(
         ({"q_des": "nothing", "kp": 50.0}, "'nothing', which is not there"),
     ],
 )
-def test_a_law_that_lacks_something_has_one_line(
-    law: dict[str, object], told: str, tmp_path: Path
-) -> None:
-    path, _ = written(tmp_path)
+def test_a_law_that_lacks_something_has_one_line(law: dict[str, object], told: str) -> None:
     with pytest.raises(LogError, match=told) as raised:
-        read_log(path, profile(tau1=law) if "q_des" in law else profile_without_first(law))
+        read_log(LOG, profile(tau1=law) if "q_des" in law else profile_without_first(law))
     assert "\n" not in str(raised.value)
 
 
@@ -74,10 +62,9 @@ def profile_without_first(law: dict[str, object]) -> Profile:
     return with_settings(Profile(), {"tau1": law, "tau2": LAWS["tau2"]})
 
 
-def test_without_velocities_a_law_differentiates_the_angles(tmp_path: Path) -> None:
-    path, tau = written(tmp_path, velocities=False)
-    log = read_log(path, profile())
+def test_without_velocities_a_law_differentiates_the_angles() -> None:
+    log = read_log(STILL, profile())
     assert log.omega is None
     # kd h² / 6 of the third derivative, 8 rad/s³ at most; first order at both ends
-    np.testing.assert_allclose(log.tau[:, 1:-1], tau[:, 1:-1], atol=2.0 * 0.01**2 / 6 * 8)
-    np.testing.assert_allclose(log.tau, tau, atol=2.0 * 0.01 / 2 * 4)
+    np.testing.assert_allclose(log.tau[:, 1:-1], TAU[:, 1:-1], atol=2.0 * 0.01**2 / 6 * 8)
+    np.testing.assert_allclose(log.tau, TAU, atol=2.0 * 0.01 / 2 * 4)

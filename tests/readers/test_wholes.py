@@ -195,3 +195,45 @@ def test_a_matlab_file_whose_matrices_fit_nothing_says_what_it_holds(tmp_path: P
 
 
 ARM = ("theta1", "theta2", "tau1", "tau2")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"t": LOG.t}, "no column for theta1"),
+        ({"t": np.array([object()])}, "cannot be read|can be read"),
+        ({"note": np.array("no number")}, "no arrays of two samples"),
+    ],
+)
+def test_archives_without_a_log_are_refused(
+    content: dict[str, np.ndarray], words: str, tmp_path: Path
+) -> None:
+    np.savez(tmp_path / "log.npz", **content)  # type: ignore[arg-type]
+    with pytest.raises(LogError, match=words):
+        read_log(tmp_path / "log.npz")
+
+
+def test_more_joints_of_a_matrix_are_chosen_by_number(tmp_path: Path) -> None:
+    path = tmp_path / "log.npz"
+    three = [np.vstack([rows, LOG.t]).T for rows in (LOG.theta, LOG.tau)]
+    np.savez(path, t=LOG.t, q=three[0], tau=three[1])
+    with pytest.raises(LogError, match="3 joints"):
+        read_log(path)
+    log = read_log(path, Profile(joints=("0", "1")))
+    assert np.array_equal(log.theta, LOG.theta)
+    assert np.array_equal(log.tau, LOG.tau)
+
+
+def test_cells_texts_and_other_variables_are_passed_over(tmp_path: Path) -> None:
+    others = {
+        "cells": np.array([1, "x", LOG.t], object),
+        "text": "arm",
+        "empty": np.empty(0),
+        "flag": True,
+        "z": 1j * LOG.t,
+    }
+    path = tmp_path / "log.mat"
+    scipy.io.savemat(path, {"t": LOG.t, "q": LOG.theta.T, "tau": LOG.tau.T, **others})
+    log = read_log(path)
+    assert np.array_equal(log.theta, LOG.theta)
+    assert np.array_equal(log.tau, LOG.tau)
