@@ -147,9 +147,9 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
                 f"l1 = g k1 / k2 no positive length; give {flag('l1')}"
             )
         chosen = links_of(value, model.gravity, l1, tied | known, file)
-    path = Path(file)
+    folder = Path(file).parent if Path(file).name == "result.json" else Path(file)
     return Description(
-        name=re.sub(r"\W|^(?=\d)", "_", (path.parent if path.name == "result.json" else path).stem),
+        name=re.sub(r"\W|^(?=\d)", "_", folder.stem or "arm"),
         source=f"{file}, estimator {result.estimator}",
         result=result,
         model=model,

@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from algid.arm import Arm
-from algid.base.errors import AlgidError, ResultError, SettingError
+from algid.base.errors import AlgidError, SettingError
 from algid.base.significance import NORMAL
 from algid.exports.description import describe
 from algid.exports.formats import exported
@@ -126,60 +126,54 @@ def test_a_given_length_moves_the_constants_as_their_covariance_says() -> None:
     assert found.value["k3"] == ODD.constants()[2]
 
 
+ARM = result_of(values_of(ODD))
+
+
+def of(**values: float) -> Result:
+    """The arm's result with other constants."""
+    return result_of(values_of(ODD) | values)
+
+
+def sure_of_weights() -> Result:
+    """The arm's result with a k1 that it knows badly, so that a given l1 moves k1 alone."""
+    assert ARM.fit is not None
+    covariance = [list(row) for row in ARM.fit.covariance]
+    covariance[0][0] = 1.0
+    return ARM.model_copy(update={"fit": ARM.fit.model_copy(update={"covariance": covariance})})
+
+
+NEGATIVE = "a mass or an inertia comes out negative; of link 2's masses"
+POINT = {"l1": 0.4, "l2": 0.3}
+
+
 @pytest.mark.parametrize(
-    ("to", "known", "message"),
+    ("to", "result", "known", "message"),
     [
+        ("urdf", ARM, {"m2": 5.0}, f"arm: with --set m2 5 {NEGATIVE} 0."),
+        ("urdf", ARM, {"m1": 0.01}, f"arm: with --set m1 0.01 {NEGATIVE} none is left"),
+        ("urdf", ARM, {"rotor1": 1.0}, f"arm: with --set rotor1 1 {NEGATIVE} none is left"),
+        ("python", ARM, {"m1": 1.0}, "--set m1: python holds no such number; leave it out"),
+        ("payload", ARM, {"l1": 1.0}, "--l1: payload holds no such number; leave it out"),
+        ("payload", ARM, {}, "arm: the result has no payload; identify with --loaded LOG"),
         (
-            "urdf",
-            {"m2": 5.0},
-            "arm: with --set m2 5 a mass or an inertia comes out negative; of link 2's masses 0.",
+            "payload",
+            result_of(values_of(ODD), payload={"m_p": -0.2} | POINT),
+            {},
+            "no load explains a payload of -0.2 kg",
         ),
         (
             "urdf",
-            {"m1": 0.01},
-            "arm: with --set m1 0.01 a mass .* comes out negative; of link 2's masses none is left",
+            of(k2=-0.1),
+            {},
+            r"k1 .*, k2 .* and g 9\.81 make l1 = g k1 / k2 no positive length; give --l1",
         ),
-        ("urdf", {"rotor1": 1.0}, "arm: with --set rotor1 1 a mass .* none is left"),
-        ("python", {"m1": 1.0}, "--set m1: python holds no such number; leave it out"),
-        ("payload", {"l1": 1.0}, "--l1: payload holds no such number; leave it out"),
-        ("payload", {}, "arm: the result has no payload; identify with --loaded LOG"),
+        ("mjcf", result_of(values_of(ODD), Model(gravity=0.0)), {}, "g 0 make l1 = .*; give --l1"),
+        ("c", of(k1=3.0), {}, "not positive definite .* identify it from more informative logs"),
+        ("urdf", sure_of_weights(), {"l1": 1.6}, "not positive definite .* negative; check --l1"),
     ],
 )
-def test_what_contradicts_physics_is_refused(
-    to: str, known: dict[str, float], message: str
+def test_what_no_arm_explains_is_refused(
+    to: str, result: Result, known: dict[str, float], message: str
 ) -> None:
     with pytest.raises(AlgidError, match=message):
-        exported(result_of(values_of(ODD)), "arm", to, known)
-
-
-def sure_of_weights(result: Result) -> Result:
-    """The result with a k1 that it knows badly, so that a given l1 moves k1 alone."""
-    assert result.fit is not None
-    covariance = [list(row) for row in result.fit.covariance]
-    covariance[0][0] = 1.0
-    return result.model_copy(
-        update={"fit": result.fit.model_copy(update={"covariance": covariance})}
-    )
-
-
-def test_results_that_no_arm_explains_are_refused() -> None:
-    with pytest.raises(
-        ResultError,
-        match=r"k1 .*, k2 .* and g 9\.81 make l1 = g k1 / k2 no positive length; give --l1",
-    ):
-        exported(result_of({**values_of(ODD), "k2": -0.1}), "arm", "urdf", {})
-    with pytest.raises(ResultError, match="not positive definite"):
-        exported(result_of({**values_of(ODD), "k1": 3.0}), "arm", "c", {})
-    with pytest.raises(
-        ResultError, match=r"not positive definite .* masses would come out negative; check --l1"
-    ):
-        exported(sure_of_weights(result_of(values_of(ODD))), "arm", "urdf", {"l1": 1.6})
-    with pytest.raises(ResultError, match="g 0 make l1 = g k1 / k2 no positive length; give --l1"):
-        exported(result_of(values_of(ODD), Model(gravity=0.0)), "arm", "mjcf", {})
-    with pytest.raises(ResultError, match=r"no load explains a payload of -0\.2 kg"):
-        exported(
-            result_of(values_of(ODD), payload={"m_p": -0.2, "l1": 0.4, "l2": 0.3}),
-            "arm",
-            "payload",
-            {},
-        )
+        exported(result, "arm", to, known)

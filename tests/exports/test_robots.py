@@ -16,7 +16,7 @@ from algid.exports.formats import SUFFIXES, exported
 from algid.model import Model
 from algid.results import Status
 from tests.exports.arms import ODD, result_of, states, values_of
-from tests.exports.test_peers import text_of
+from tests.exports.test_peers import BENT, bent, text_of
 
 XML = ("urdf", "sdf", "mjcf")
 
@@ -74,6 +74,51 @@ def test_what_a_comment_may_not_hold_is_written_otherwise() -> None:
         else:
             compile(text, "arm.py", "exec")
             assert "a--b * / ''' /n.algid" in text
+
+
+def test_the_header_says_where_each_number_comes_from() -> None:
+    model, payload = Model(("coulomb",)), {"m_p": 0.5, "l1": 0.4, "l2": 0.3}
+    result = result_of(values_of(ODD, f1=0.4, f2=0.3), model, payload, std=0.01)
+    prior = result.parameters["k3"].model_copy(update={"status": Status.FROM_PRIOR})
+    late = result.parameters["k6"].model_copy(update={"estimate": 0.0125, "unit": "s"})
+    more = {**result.parameters, "k3": prior, "delay": late}
+    text, _ = exported(
+        result.model_copy(update={"parameters": more}), "result.json", "urdf", {"rotor1": 0.01}
+    )
+    assert 'robot name="arm"' in text
+    assert origins(text) == {
+        "k1": "identified, ± 0.00043 (95 %), conditioned on l1",
+        "k3": "from the prior, not measured, ± 0.00028 (95 %), conditioned on l1",
+        "f1": "identified, ± 0.0078 (95 %), conditioned on l1",
+        "g": "given",
+        "l1": "identified with the payload, ± 0.0078 (95 %)",
+        "m1": "chosen, nearest to a uniform link",
+        "lc1": "chosen with the masses: k4 = g (m1 lc1 + m2 l1)",
+        "rotor1": "given",
+        "l2": "identified with the payload",
+    }
+    said = re.findall(r"This file (.*)\.\n", text)
+    assert [" ".join(one.split()[:3]) for one in said] == [
+        "holds Coulomb friction",
+        "lacks the delay",
+        "holds rotor1 within",
+    ]
+    found = origins(text_of("mjcf", bent(0.2), BENT, m1=1.9, m2=0.7))
+    assert {name: found[name] for name in ("l1", "m1", "lc1", "rotor1", "l2")} == {
+        "l1": "identified, g k1 / k2, ± 0.00099 (95 %)",
+        "m1": "given",
+        "lc1": "identified, given m1 and m2: k4 = g (m1 lc1 + m2 l1)",
+        "rotor1": "chosen: k5 holds it",
+        "l2": "chosen, nearest to a uniform link",
+    }
+
+
+def origins(text: str) -> dict[str, str]:
+    """Where the header has some numbers from."""
+    names = "k1|k3|f1|g|l1|m1|lc1|rotor1|l2"
+    return dict(
+        re.findall(rf"^  ({names}) +[-\d.e]+ +(?:kg m\^2|N m|m/s\^2|kg|m) +(.*)$", text, re.M)
+    )
 
 
 def test_the_payload_is_yaml_that_a_planner_reads() -> None:
