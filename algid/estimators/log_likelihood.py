@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cached_property, partial, reduce
 from operator import add
 
 import numpy as np
@@ -60,41 +60,24 @@ _FOLLOWED = 0.5  # change of a log variance, beyond which what follows it is not
 _NEGLIGIBLE = 1e-3  # torque error relative to the torque that no one need worry about
 
 
-@dataclass(eq=False)
-class _Innovations:
-    """The innovations (2, n) of a piece, `dt` s apart; most passes do not need their sums."""
-
-    joints: FloatArray
-    dt: float
-
-    @cached_property
-    def residual(self) -> ResidualSums:
-        return residual_sums(self.joints, self.dt)
-
-    def summed(self) -> _Innovations:
-        """The sums alone, without what they are made of."""
-        _ = self.residual
-        self.joints = np.empty((2, 0))
-        return self
-
-
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """What one pass over pieces of a log gives.
 
     `deviance` is minus twice the log-likelihood at the pass's coefficients, but for a constant;
-    `noise_change` the largest change of a log variance in its deviations.
+    `noise_change` the largest change of a log variance in its deviations; `sums` give those over
+    each piece's innovations, which most passes do not need.
     """
 
     information: LogInformation
-    pieces: tuple[_Innovations, ...]
+    sums: tuple[Callable[[], ResidualSums], ...]
     deviance: float
     noise_change: float = 0.0
 
     @cached_property
     def residual(self) -> ResidualSums:
         """Sums over the innovations."""
-        return reduce(add, [piece.residual for piece in self.pieces])
+        return reduce(add, [one() for one in self.sums])
 
 
 class LogEvidence:
@@ -242,7 +225,7 @@ class LogEvidence:
             first = self._linearise(c, start, piece, residual_only=True)
             multiplier = first.solve_transposed(first.columns[-1:])[0]
             theta = trajectory(piece, first, multiplier, self.noise)
-            gathered.take(self._linearise(c, theta, piece), piece.dt, self.noise).summed()
+            gathered.take(self._linearise(c, theta, piece), piece.dt, self.noise, at_once=True)
         return gathered.outcome(self.loaded, c)
 
     @property
@@ -348,15 +331,22 @@ class _Gathered:
 
     def __init__(self) -> None:
         self._S, self._g, self._by_noise = BlockSums(), BlockSums(), BlockSums()
-        self._pieces: list[_Innovations] = []
+        self._sums: list[Callable[[], ResidualSums]] = []
         self._deviance = 0.0
 
     def take(
-        self, linear: Linearised, dt: float, noise: NoiseLevels, by_noise: FloatArray | None = None
-    ) -> _Innovations:
-        """Add a piece, its samples `dt` s apart, whitened by such noise; gives its innovations.
+        self,
+        linear: Linearised,
+        dt: float,
+        noise: NoiseLevels,
+        by_noise: FloatArray | None = None,
+        *,
+        at_once: bool = False,
+    ) -> None:
+        """Add a piece, its samples `dt` s apart, whitened by such noise.
 
-        `by_noise` (4, 2 n) is how the innovations fall with each log variance.
+        `by_noise` (4, 2 n) is how the innovations fall with each log variance. Those are added up
+        `at_once`, or kept for whoever asks.
         """
         columns, w = linear.columns, linear.columns[-1]
         own = w @ w + 2 * np.log(linear.factor[-1]).sum() + w.size * np.log(noise.tau).sum()
@@ -373,13 +363,17 @@ class _Gathered:
         self._g.add(gram[:, :, q])
         if by_noise is not None:
             self._by_noise.add(gram[:, :, q + 1 :])
-        self._pieces.append(_Innovations(np.ascontiguousarray(w.reshape(-1, 2).T), dt))
-        return self._pieces[-1]
+        innovations = np.ascontiguousarray(w.reshape(-1, 2).T)
+        if at_once:
+            total = residual_sums(innovations, dt)
+            self._sums.append(lambda: total)
+        else:
+            self._sums.append(partial(residual_sums, innovations, dt))
 
     def outcome(self, loaded: bool, c: FloatArray) -> Outcome:
         """What the pass at the coefficients `c` has given."""
         information = LogInformation(loaded, c, self._S.values(), self._g.values())
-        return Outcome(information, tuple(self._pieces), self._deviance)
+        return Outcome(information, tuple(self._sums), self._deviance)
 
     def followed(
         self, information: LogInformation, step: FloatArray, score: VarianceScore

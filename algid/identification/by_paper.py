@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.arm import CONSTANT_NAMES, FloatArray, mass_matrix
+from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.base.errors import LogError
 from algid.estimators.diagnostics import FAR_BEYOND
 from algid.estimators.paper import (
@@ -168,8 +168,8 @@ def _is_no_arm(k: FloatArray, wander: FloatArray) -> bool:
     """
     if np.any((k + FAR_BEYOND * wander[: k.size])[[5, 6]] < 0):
         return True
-    m11, m12, m22 = mass_matrix(k, np.array([[0.0, 0.0], [0.0, np.pi]]))
-    return bool(np.any(m22 <= 0) or np.any(m11 * m22 - m12**2 <= 0))
+    # eq. (2): det M = k3 k5 − k1² wherever joint 2 is turned by half a turn or not at all
+    return bool(k[2] <= 0 or k[2] * k[4] <= k[0] ** 2)
 
 
 def _named(

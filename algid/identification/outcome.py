@@ -216,6 +216,13 @@ def fit_summary(found: Fitted) -> results.FitSummary:
     if known is not None and "m_p" in fit.names:
         # all that has N m in its unit, m_p too, grows with a common gain of both torques
         gain = _inverse(fit, "m_p", known, "1")
+    endogeneity = {}
+    if fit.endogeneity is not None:
+        # as many coefficients were looked at as a log has (Bonferroni)
+        p = chance(fit.endogeneity, len(fit.shared.log_names))
+        endogeneity["largest"] = results.Endogeneity(
+            statistic=fit.endogeneity, p_value=p, endogenous=p < level("INSTRUMENTS")
+        )
     return results.FitSummary(
         noise=noise,
         covariance_names=list(outside(fit.names, fit.absent)),
@@ -235,7 +242,7 @@ def fit_summary(found: Fitted) -> results.FitSummary:
         terms=list(_terms(fit, chosen)),
         torque_hold=_torque_hold(chosen),
         broken_bounds=_bounds(fit),
-        endogeneity=_endogeneity(fit),
+        endogeneity=endogeneity,
         by_log=by_log,
         residual=prediction(residual),
         cross_validation=None if crossed is None else prediction(crossed),
@@ -276,18 +283,6 @@ def _bounds(fit: Fit) -> list[results.Bound]:
             results.Bound(bound=broken.bound, value=broken.value, distance_sigma=distance)
         )
     return bounds
-
-
-def _endogeneity(fit: Fit) -> dict[str, results.Endogeneity]:
-    """The largest disagreement of instruments and least squares; empty where it was not tested."""
-    statistic = fit.endogeneity
-    if statistic is None:
-        return {}
-    # as many coefficients were looked at as a log has (Bonferroni)
-    p_value = chance(statistic, len(fit.shared.log_names))
-    endogenous = p_value < level("INSTRUMENTS")
-    test = results.Endogeneity(statistic=statistic, p_value=p_value, endogenous=endogenous)
-    return {"largest": test}
 
 
 def _predicted(found: Fitted) -> tuple[PredictionScore, PredictionScore | None]:
