@@ -17,6 +17,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 import algid
+from algid.api.track import answer
 from algid.base.errors import ResultError
 from algid.identification.identify import identify
 from algid.synth.sensors import Sensors
@@ -53,6 +54,14 @@ def files(picking: algid.Log, tmp_path_factory: pytest.TempPathFactory) -> tuple
 @pytest.fixture(scope="module")
 def result(files: tuple[Path, Path]) -> TrackResult:
     return track_log(*files, l1=CASE.arm.l1, l2=CASE.arm.l2)
+
+
+def test_a_track_with_one_stretch_that_says_nothing_ends_with_three(result: TrackResult) -> None:
+    first, *others = result.track.stretches
+    silent = replace(result.track, stretches=[replace(first, std=1e9), *others])
+    partly, given = replace(result, track=silent), {"log": "a.mcap", "out": Path()}
+    assert not verdict(partly).failed
+    assert (answer(result, given).exit, answer(partly, given).exit) == (0, 3)
 
 
 def test_the_mcap_bears_the_stamps_of_the_log(result: TrackResult, tmp_path: Path) -> None:
