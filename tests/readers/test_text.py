@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 import zstandard
 
+import algid
 from algid.base.errors import LogError
 from algid.log import Log
+from algid.profile import Profile
 from algid.readers import read_log
 from tests.conftest import Limited
 from tests.readers.logs import noise_log
@@ -171,3 +173,27 @@ def test_lines_that_end_in_carriage_returns_alone_are_refused(
         read_log(tmp_path / "log.csv")
     (tmp_path / "log.csv").write_bytes(("\r\n".join([header, *ROWS[:30]]) + "\r\n").encode())
     assert len(read_log(tmp_path / "log.csv")) == 30
+
+
+def test_a_row_that_lacks_a_value_has_no_time_to_be_counted_by(tmp_path: Path) -> None:
+    rows = [line.partition(",")[2] for line in ROWS]
+    rows[7] = rows[7].rpartition(",")[0] + ","
+    (tmp_path / "log.csv").write_text("\n".join([HEAD.removeprefix("t,"), *rows, ""]))
+    with pytest.raises(LogError, match="rows lack a value, and without a time"):
+        read_log(tmp_path / "log.csv", Profile(rate=200.0))
+
+
+def test_columns_of_a_table_without_a_header_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    log = algid.synthesise("case1", duration=1.0, rate=200.0, torque="wide")[0]
+    np.savetxt(path, np.column_stack([log.t, log.theta.T, log.tau.T]), delimiter=",")
+    seen = algid.inspect(path)
+    assert [one.name for one in seen.entries] == [f"column {n}" for n in range(1, 6)]
+    assert seen.refused is not None
+    assert "no column for t, theta1, theta2, tau1, tau2; found 'column 1', 'co" in seen.refused
+    assert algid.inspect(path, columns=HEAD).refused is None
+    own = read_log(path, Profile(columns=NAMES))
+    assert np.array_equal(own.theta, log.theta)
+    assert len(own) == len(log)
+    with pytest.raises(LogError, match=r"5 columns, and 2 names for them: t, q1; name each"):
+        read_log(path, Profile(columns=("t", "q1")))
