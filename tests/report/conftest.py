@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,12 @@ def case_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("results") / "case1.algid"
     build(folder, duration=4.0)
     return folder
+
+
+@pytest.fixture
+def folder(case_folder: Path, tmp_path: Path) -> Path:
+    """A copy of it, to be changed."""
+    return Path(shutil.copytree(case_folder, tmp_path / "case1.algid"))
 
 
 @pytest.fixture(scope="session")

@@ -30,11 +30,6 @@ def browser() -> Iterator[Browser]:
     opened.close()
 
 
-@pytest.fixture
-def folder(case_folder: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(case_folder, tmp_path / "case1.algid"))
-
-
 def assert_sound(seen: Seen, page: Path, title: str) -> None:
     assert seen.console == []
     assert seen.failed == 0

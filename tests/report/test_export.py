@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
@@ -69,16 +68,12 @@ def test_a_folder_without_a_result_is_refused(tmp_path: Path) -> None:
         export_mcap(tmp_path)
 
 
-@pytest.mark.parametrize("name", ["torque", "estimates"])
-def test_stamps_that_no_message_holds_are_refused(
-    name: str, case_folder: Path, tmp_path: Path
-) -> None:
-    folder = Path(shutil.copytree(case_folder, tmp_path / case_folder.name))
+def test_stamps_that_no_message_holds_are_refused(folder: Path) -> None:
     (folder / "estimates.mcap").unlink(missing_ok=True)
-    path = folder / f"{name}.parquet"
+    path = folder / "torque.parquet"
     table = pq.read_table(path)
     late = {START_KEY: json.dumps([2**31 * 10**9] * 2)}
     pq.write_table(table.replace_schema_metadata({**(table.schema.metadata or {}), **late}), path)
-    with pytest.raises(OutputError, match=rf"{name}\.parquet: ROS 2 messages hold times from 1970"):
+    with pytest.raises(OutputError, match=r"torque\.parquet: ROS 2 messages hold times from 1970"):
         export_mcap(folder)
     assert not (folder / "estimates.mcap").exists()

@@ -8,7 +8,6 @@ import hashlib
 import html
 import json
 import re
-import shutil
 from importlib import resources
 from pathlib import Path
 
@@ -38,11 +37,6 @@ FIGURES = [
     "intervals", "torque", "closeup", "residual", "running", "signals", "coverage",
     "correlation", "information", "inertia", "estimates", "loaded",
 ]  # fmt: skip
-
-
-@pytest.fixture
-def folder(case_folder: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(case_folder, tmp_path / "case1.algid"))
 
 
 def written(folder: Path, result: Result | None = None, shared: bool = False) -> Page:
