@@ -31,12 +31,12 @@ from algid.batches.jobs import (
     Job,
     JobRecord,
     JobStatus,
+    jobs_frame,
     read_records,
     record_name,
     stat_of,
     write_record,
 )
-from algid.batches.table import jobs_frame
 from algid.batches.workers import CallFailedError, WorkerDiedError
 from algid.options import flag
 
