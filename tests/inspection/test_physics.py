@@ -15,7 +15,7 @@ import pytest
 
 from algid.estimators.conventions import AS_READ, Convention
 from algid.inspection.checks import inspect_log
-from algid.inspection.conventions import judged, mend
+from algid.inspection.conventions import judged, mend, mends, recorded
 from algid.inspection.draft import draft_profile
 from algid.inspection.figures import dynamic_figures
 from algid.log import Log, Origin, Reading
@@ -43,6 +43,19 @@ def test_conventions_are_judged_over_all_stretches() -> None:
     assert found.remedies[0].settings == {"tau1.sign": -1, "tau2.sign": -1}
     alone = log.part(0, int(np.argmax(np.diff(log.stamp_ns))) + 1)
     assert judged(alone) is None
+
+
+def test_logs_of_one_arm_are_judged_together_and_where_they_disagree_alone() -> None:
+    right = moving_log()
+    wrong = replace(right, tau=-right.tau)
+    right_parts, wrong_parts = ((one.origin, recorded(one)) for one in (right, wrong))
+    for logs, mended in (((wrong_parts, wrong_parts), [True, True]),
+                         ((right_parts, wrong_parts), [False, True])):  # fmt: skip
+        found = mends(logs)
+        assert [one is not None for one in found] == mended
+        assert all(
+            one.remedies[0].settings == {"tau1.sign": -1, "tau2.sign": -1} for one in found if one
+        )
 
 
 CONVENTIONAL = {"FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED", "WRONG_CONVENTION"}
@@ -83,6 +96,9 @@ def test_torques_without_weight_and_of_noise() -> None:
     assert [one.settings for one in found.remedies] == [
         {"effort": "gravity-compensated"}, {"gravity": 0},
     ]  # fmt: skip
+    # slow and reversed it leaves open what is wrong, and is not called weightless
+    slow = moving_log(20_000, 0.1, np.where([0, 1, 0, 1, 0, 0, 0], 0.0, K))
+    assert not CONVENTIONAL & {one.code for one in noticed(replace(slow, tau=-slow.tau))}
     noise = replace(light, tau=np.random.default_rng(3).standard_normal(light.tau.shape))
     assert not CONVENTIONAL & {one.code for one in noticed(noise)}
 
@@ -175,6 +191,11 @@ TORQUES_SWAPPED = '--set tau1.source="tau2" --set tau2.source="tau1"'
             Convention(zero=(0.0, HALF)),
             "the angles have to be offset by [0.0, 1.5708] rad",
             "--set offsets=[0.0, 1.5708]",
+        ),
+        (
+            Convention(zero=(0.0, 4.0)),
+            "the angles have to be offset by [0.0, -2.28319] rad",
+            "--set offsets=[0.0, -2.28319]",
         ),
     ],
 )
