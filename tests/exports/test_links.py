@@ -17,7 +17,7 @@ from algid.exports.formats import exported
 from algid.exports.links import Link, links_of
 from algid.model import Model
 from algid.results import Result
-from tests.exports.arms import ODD, result_of, values_of
+from tests.exports.arms import ODD, UNIFORM, result_of, values_of
 
 POSITIVE = st.floats(0.05, 20)
 
@@ -109,6 +109,17 @@ def test_nearest_is_nearest() -> None:
             others.append(sum(map(divergence, pair)))
     assert len(others) > 100
     assert chosen <= min(others) + 1e-6
+
+
+@pytest.mark.parametrize("gravity", [0.0, 9.81])
+@pytest.mark.parametrize("known", [{}, {"m1": UNIFORM.m1}, {"m2": UNIFORM.m2}], ids=str)
+def test_uniform_links_are_found_again(known: dict[str, float], gravity: float) -> None:
+    value = values_of(Arm(**{**vars(UNIFORM), "g": gravity}))
+    links = links_of(value, gravity, UNIFORM.l1, known, "arm")
+    found = [(link.mass, link.length, link.centre, link.inertia) for link in links]
+    true = UNIFORM
+    expected = [(true.m1, true.l1, true.lc1, true.I1), (true.m2, true.l2, true.lc2, true.I2)]
+    np.testing.assert_allclose(found, expected, rtol=1e-5)  # the search's
 
 
 def test_a_given_length_moves_the_constants_as_their_covariance_says() -> None:
