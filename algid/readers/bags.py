@@ -87,7 +87,8 @@ def _files_of_folder(folder: Path) -> tuple[list[Path], tuple[Notice, ...]]:
             )
     there = [folder / name for name in names if (folder / name).is_file()]
     if not there:
-        raise LogError(f"{folder}: none of the bag's files is there; expected {names[:3]}")
+        wanted = ", ".join(names[:3]) or "metadata.yaml, *.mcap or *.db3"
+        raise LogError(f"{folder}: no file of a rosbag2 folder is there; expected {wanted}")
     missing = [name for name in names if folder / name not in there]
     numbers = {"missing": len(missing), "files": len(names), "names": ", ".join(missing[:3])}
     notices = (Notice("DAMAGED", numbers={"case": "split"} | numbers),) if missing else ()

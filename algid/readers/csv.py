@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from algid.base.errors import LogError
 from algid.base.files import read_whole
+from algid.base.text import visible
 from algid.log import Companion, loads
 from algid.notices import Notice
 from algid.readers.dialect import Dialect, detect, head_of, pieces
@@ -168,7 +169,7 @@ def _batches(
             f"{path}: past row {done - frame.height}: {error}; expected dates of 1678 to 2261"
         ) from error
     except pl.exceptions.PolarsError as error:
-        reason = str(error).partition("\n")[0][:200]
+        reason = visible(str(error).partition("\n")[0], 200)
         raise LogError(
             f"{path}: past row {done}: {reason}; mend that row, quotes too, or name other columns"
         ) from error

@@ -210,12 +210,12 @@ def open_offered(offered: Offered, profile: Profile) -> TableReader:
         accepted=profile.accept,
     )
     notices += of_units
-    notices += unused(offered.said, reading, profile)
+    said = [line[: LIMITS.stated_letters] for line in offered.said[: LIMITS.stated_lines]]
+    notices += unused(said, reading, profile)
     notices += settings_unused(profile, reading, mapping)
     origin = Origin(path, offered.kind, mapping, offered.truth, reading)
     tables, laws = partial(offered.tables, sources, clock), laws_of(path, profile)
-    rate = stated_rate(offered.said)
-    return TableReader(origin, tables, tuple(notices), offered.rows, rate, laws)
+    return TableReader(origin, tables, tuple(notices), offered.rows, stated_rate(said), laws)
 
 
 def _sources(offered: Offered, profile: Profile) -> dict[str, str]:

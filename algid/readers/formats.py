@@ -6,7 +6,6 @@ table: opening and inspecting a log, the logs of a folder, the guide.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +17,6 @@ from algid.readers.dialect import head_of, looks_like_text
 
 if TYPE_CHECKING:
     from algid.profile import Profile
-    from algid.readers.messages.message_file import MessageFile
     from algid.readers.messages.offer import MessageLog
     from algid.readers.table_cells import TableFile
 
@@ -127,7 +125,22 @@ def format_of(path: Path) -> FileFormat:
     LogError
         If there is no such file, it cannot be read, or its content is of no format.
     """
-    head = _head(path)
+    # bytes that polars and results cannot name
+    if any(0xD800 <= ord(letter) <= 0xDFFF for letter in str(path)):
+        raise LogError(f"{str(path)!r}: the name is not valid UTF-8; rename the log")
+    try:
+        if path.is_dir():
+            return _BY_NAME["rosbag2"]
+        if not path.is_file():
+            problem = "it is no regular file" if path.exists() else "there is no such file"
+            raise LogError(
+                f"{path}: {problem}; expected a log in MCAP, Parquet or CSV; check the name"
+            )
+        head = read_start(path, LIMITS.head_bytes)
+    except (OSError, ValueError) as error:
+        raise LogError(
+            f"{str(path)!r}: the log cannot be read ({error}); check the name and rights"
+        ) from error
     for form in FORMATS:
         if not (form.magic and head.startswith(form.magic)):
             continue
@@ -145,8 +158,6 @@ def format_of(path: Path) -> FileFormat:
         from algid.readers.arrays import is_json_lines
 
         return _BY_NAME["jsonl" if is_json_lines(head) else "csv"]
-    if not head and path.is_dir():
-        return _BY_NAME["rosbag2"]
     if not head:
         raise LogError(f"{path}: the file is empty; expected a log in MCAP, Parquet or CSV")
     if head.startswith(b"\x93NUMPY"):
@@ -159,41 +170,6 @@ def format_of(path: Path) -> FileFormat:
     )
 
 
-def _head(path: Path) -> bytes:
-    """The first bytes of a file, none of a folder that may be a bag.
-
-    Raises
-    ------
-    LogError
-        If there is no such file, or it cannot be read.
-    """
-    # bytes that polars and results cannot name
-    if any(0xD800 <= ord(letter) <= 0xDFFF for letter in str(path)):
-        raise LogError(f"{str(path)!r}: the name is not valid UTF-8; rename the log")
-    try:
-        if path.is_dir():
-            if (
-                (path / "metadata.yaml").is_file()
-                or any(path.glob("*.mcap"))
-                or any(path.glob("*.db3"))
-            ):
-                return b""
-            raise LogError(
-                f"{path}: a folder without metadata.yaml or *.mcap; expected a log file or a "
-                "rosbag2 folder"
-            )
-        if not path.is_file():
-            problem = "it is no regular file" if path.exists() else "there is no such file"
-            raise LogError(
-                f"{path}: {problem}; expected a log in MCAP, Parquet or CSV; check the name"
-            )
-        return read_start(path, LIMITS.head_bytes)
-    except (OSError, ValueError) as error:
-        raise LogError(
-            f"{str(path)!r}: the log cannot be read ({error}); check the name and rights"
-        ) from error
-
-
 def entries_of(opened: TableFile | MessageLog) -> Entries:
     """What a log holds, by name: columns, or the topics of its first file.
 
@@ -204,25 +180,24 @@ def entries_of(opened: TableFile | MessageLog) -> Entries:
     """
     from algid.readers.table_cells import TableFile, cells_of
 
-    if not isinstance(opened, TableFile):
-        return tuple(_topics(opened.files[0]()))
-    rows = opened.rows or None
-    cells = cells_of(opened).items()
-    entries = [Entry(name, str(cell.type)[:80], rows) for name, cell in cells]
-    entries += [Entry(name, "of another length") for name in opened.others]
-    return tuple(entries)
-
-
-def _topics(file: MessageFile) -> Iterator[Entry]:
+    if isinstance(opened, TableFile):
+        rows = opened.rows or None
+        cells = cells_of(opened).items()
+        entries = [Entry(name, str(cell.type)[:80], rows) for name, cell in cells]
+        entries += [Entry(name, "of another length") for name in opened.others]
+        return tuple(entries)
     from algid.readers.messages.offer import fields_shown
 
+    file, entries = opened.files[0](), []
     first, last = file.span_ns or (0, 0)
     for place, (number, channel) in enumerate(sorted(file.channels.items())):
         form = f"{channel.type or 'no schema'}, {channel.encoding}"
         count = file.counts.get(number, 0)
         rate = 1e9 * (count - 1) / (last - first) if count > 1 and last > first else None
         joints, fields = fields_shown(file, number) if place < _MOST_SHOWN else ((), ())
-        yield Entry(channel.topic, form, count, joints[:_MOST_SHOWN], fields[:_MOST_SHOWN], rate)
+        shown = joints[:_MOST_SHOWN], fields[:_MOST_SHOWN]
+        entries.append(Entry(channel.topic, form, count, *shown, rate))
+    return tuple(entries)
 
 
 def entries_at(path: Path) -> Entries:

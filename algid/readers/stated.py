@@ -138,8 +138,8 @@ def lines_of(metadata: Mapping[str, str]) -> Iterator[str]:
 def unused(said: Iterable[str], reading: Reading, profile: Profile) -> Iterator[Notice]:
     """One notice of the `said` lines of text that state what is not used."""
     found: dict[str, Remedy] = {}
-    for line in islice(said, LIMITS.stated_lines):
-        text = " ".join(line[: LIMITS.stated_letters].split())
+    for line in said:
+        text = " ".join(line.split())
         key, value = _stated(text)
         settings = dict(_other_units(text, reading))
         if value in _CONVENTIONS.get(key, ()) and key not in profile.model_fields_set:
@@ -162,8 +162,8 @@ def _stated(line: str) -> tuple[str, str]:
 
 def stated_rate(said: Iterable[str]) -> float | None:
     """Samples a second that a line states."""
-    for line in islice(said, LIMITS.stated_lines):
-        key, value = _stated(line[: LIMITS.stated_letters])
+    for line in said:
+        key, value = _stated(line)
         if key in _RATES and re.fullmatch(r"\d+\.?\d*", value):
             return float(value)
     return None

@@ -102,9 +102,9 @@ def test_files_without_metadata_come_by_their_numbers(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("names", "more", "words"),
     [
-        (["a.db3", "b.db3"], "", r"none of the bag's files is there; expected \['a.db3', 'b"),
-        (["../a.db3"], "", "none of the bag's files is there"),  # it is, outside the folder
-        ([".."], "", "none of the bag's files is there"),
+        (["a.db3", "b.db3"], "", "no file of a rosbag2 folder is there; expected a.db3, b.db3"),
+        (["../a.db3"], "", "no file of a rosbag2 folder is there"),  # it is, outside the folder
+        ([".."], "", "no file of a rosbag2 folder is there"),
         (
             ["a.db3"],
             "  compression_mode: FILE\n",

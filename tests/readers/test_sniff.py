@@ -12,6 +12,7 @@ import zstandard
 
 from algid.api.guide import text_of
 from algid.base.errors import LogError
+from algid.readers import read_log
 from algid.readers.dialect import Dialect, detect, looks_like_text, split
 from algid.readers.formats import FORMATS, SUFFIXES, format_of
 
@@ -63,8 +64,8 @@ def test_what_is_no_log_is_refused(content: bytes, words: str, tmp_path: Path) -
 
 
 def test_folders(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"a folder without metadata.yaml or \*.mcap"):
-        format_of(tmp_path)
+    with pytest.raises(LogError, match=r"no file of .*; expected metadata.yaml, \*.mcap or \*.db3"):
+        read_log(tmp_path)
     for name in ("log.mcap", "log.db3", "metadata.yaml"):
         folder = tmp_path / name.partition(".")[2]
         folder.mkdir()

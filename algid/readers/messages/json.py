@@ -62,10 +62,11 @@ class JsonRecords:
             raise MisfitError("a JSON message that is no object")
         leaves: dict[str, Any] = {}
         _gather(content, "", leaves, 0)
-        numbers = {}
-        for path, leaf in leaves.items():
-            if type(leaf) is float or (type(leaf) is bool and path in GOOD | BAD):
-                numbers[path] = float(leaf)
+        numbers = {
+            path: leaf
+            for path, leaf in leaves.items()
+            if type(leaf) is float or (type(leaf) is bool and path in GOOD | BAD)
+        }
         # what changes with every message is no structure: of very many groups a few are enough
         groups = GROUPS if len(self._known) < LIMITS.layouts else ()
         told = {
