@@ -235,8 +235,9 @@ def test_a_watch_takes_logs_once_they_stay_as_they_are_and_tells_a_trouble_once(
 
     monkeypatch.setattr("algid.batches.run.LOOK_EVERY", 0.0)
     (logs / "empty.csv").touch()
-    here = Here(fail)
-    batch = batch_of(logs.parent / "out", here)
+    here, out = Here(fail), logs.parent / "out"
+    batch = batch_of(out, here)
     batch.watch(look, complain=told.append)
     assert here.ran == ["bad", "r1/a", "r1/b", "growing"]
+    assert pl.read_parquet(out / "jobs.parquet")["job"].to_list() == sorted(here.ran)
     assert told == ["away"]
