@@ -40,7 +40,7 @@ IDEAS = {
     "leave-one-outs": r"(?i)^\w+\.\w*left_out$",
     "Runge-Kuttas": r"/ 6(\.0)? \* \(",
     "sandwiches": r"^combine\.sandwich$",
-    "tests of the model": r"^(log_likelihood\.refuted|identifiability\.judge|misfit\.misfit)$",
+    "tests of the model": r"^(log_likelihood\.refuted|innovations\.judge|misfit\.misfit)$",
     "choosers of terms": r"^(terms\.select|by_likelihood\.revised)$",
 }
 """By idea, a pattern of `module.function` or of the source of each function of the core that holds
