@@ -16,12 +16,12 @@ import polars as pl
 import pytest
 
 import algid
-from algid.base.errors import OutputError, SettingError
+from algid.base.errors import LogError, OutputError, SettingError
 from algid.base.stores import open_store
 from algid.base.verdict import Verdict
 from algid.batches.discover import jobs_of
 from algid.batches.job import Task
-from algid.batches.jobs import Job, JobStatus
+from algid.batches.jobs import Input, Job, JobStatus, stat_of
 from algid.batches.run import Batch, Batched, locked
 from algid.batches.workers import CallFailedError, WorkerDiedError
 from algid.identification.identify import identify
@@ -241,3 +241,20 @@ def test_a_watch_takes_logs_once_they_stay_as_they_are_and_tells_a_trouble_once(
     assert here.ran == ["bad", "r1/a", "r1/b", "growing"]
     assert pl.read_parquet(out / "jobs.parquet")["job"].to_list() == sorted(here.ran)
     assert told == ["away"]
+
+
+def test_a_job_whose_logs_cannot_be_looked_at_fails_this_time_and_keeps_its_row(
+    logs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def seen(path: str) -> Input:
+        if "r1/a" in path:
+            raise LogError("away")
+        return stat_of(path)
+
+    _run(logs)
+    monkeypatch.setattr("algid.batches.run.stat_of", seen)
+    ended = _run(logs)
+    one = ended.records[1]
+    assert (ended.ran, one.job.name, one.status.value, one.reason) == (0, "r1/a", "failed", "away")
+    table = pl.read_parquet(logs.parent / "out/jobs.parquet")
+    assert table["status"].to_list() == ["failed", "ok", "ok"]
