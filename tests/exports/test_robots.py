@@ -103,6 +103,8 @@ def test_the_header_says_where_each_number_comes_from() -> None:
         "lacks the delay",
         "holds rotor1 within",
     ]
+    offset = text_of("sdf", values_of(ODD, o1=0.01, o2=-0.02), Model(("offset",)))
+    assert re.search(r"This file lacks .*: o1 0\.01 N m and o2 -0\.02 N m\.\n", offset)
     found = origins(text_of("mjcf", bent(0.2), BENT, m1=1.9, m2=0.7))
     assert {name: found[name] for name in ("l1", "m1", "lc1", "rotor1", "l2")} == {
         "l1": "identified, g k1 / k2, ± 0.00099 (95 %)",
