@@ -8,7 +8,6 @@ and value, which are written as flags for the command that was typed, or as Pyth
 
 from __future__ import annotations
 
-import json
 import re
 import shlex
 import string
@@ -20,7 +19,7 @@ from importlib import resources
 from itertools import groupby
 from typing import Any
 
-from algid.base.text import counted, joined
+from algid.base.text import as_toml, counted, joined
 from algid.options import FLAGS, SET, VALUES, flag
 
 
@@ -49,7 +48,7 @@ class Remedy:
             shown = VALUES.get(name.rpartition(".")[2], "VALUE") if value is None else value
             typed, behind, _ = flag(name).partition(SET)
             if behind and value is not None and not (isinstance(value, str) and value.isalpha()):
-                shown = json.dumps(value, ensure_ascii=False)
+                shown = as_toml(value)
             elif isinstance(shown, list | tuple):
                 shown = ",".join(map(str, shown))
             words += [SET.strip(), f"{name}={shown}"] if behind else [typed, str(shown)]

@@ -25,7 +25,8 @@ def numbers_of(column: Any) -> NDArray[np.float64]:
     """Numbers (N,) of any Arrow array of them as float64; NaN where one is missing."""
     import pyarrow
 
-    if column.null_count or pyarrow.types.is_boolean(column.type):
+    types, kind = pyarrow.types, column.type
+    if column.null_count or not (types.is_integer(kind) or types.is_floating(kind)):
         column = column.cast(pyarrow.float64()).fill_null(np.nan)
     return np.asarray(np.from_dlpack(column), dtype=np.float64)
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import errno
 import hashlib
 import io
-import json
 import os
 import re
 import reprlib
@@ -202,11 +201,6 @@ def toml_content(path: Path) -> dict[str, Any]:
         raise SettingError(f"{path}: cannot read it ({error.strerror}); check the name") from error
     except (ValueError, RecursionError) as error:
         raise SettingError(f"{path}: not TOML ({error}); mend that line") from error
-
-
-def as_toml(value: Any) -> str:
-    """Text, or a list of it, as TOML has it: as JSON, but for one control character."""
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def parsed_toml(text: str) -> dict[str, Any]:

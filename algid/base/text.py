@@ -12,6 +12,7 @@ import textwrap
 import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 LONGEST = 300
 # Controls drive a terminal, format characters reorder what is read, separators break lines.
@@ -155,3 +156,8 @@ def percent(part: float | None, whole: float | None, digits: int = 2) -> str:
     if part is None or not whole:
         return ABSENT
     return significant(100 * part / abs(whole), digits)
+
+
+def as_toml(value: Any) -> str:
+    """Text, or a list of it, as TOML has it: as JSON, but for one control character."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

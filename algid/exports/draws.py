@@ -36,7 +36,7 @@ from algid.results import Result
 TABLES = ("csv", "parquet")
 _HOPELESS = 100
 """Draws in a row that no arm is like, which says that the estimates are none's."""
-_NORMAL = 1e6
+_MOST_FREEDOM = 1e6
 """Degrees of freedom beyond which Student's t is all but normal."""
 
 
@@ -72,7 +72,7 @@ def drawn_files(
     size[size == 0] = 1.0
     still, correlation = np.zeros(len(names)), covariance / np.outer(size, size)
     freedom, random = float(stdtridf(0.975, result.quantile)), np.random.default_rng(seed)
-    freedom = inf if freedom > _NORMAL else freedom
+    freedom = inf if freedom > _MOST_FREEDOM else freedom
     shared = Shared(model, payload="m_p" in names, body=within(BODY_PARAMETERS, names))
     limits, broken = bounds(shared), list[str]()
     files: dict[str, bytes] = {"manifest.json": b""}

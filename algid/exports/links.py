@@ -39,7 +39,7 @@ from scipy.special import expit
 
 from algid.base.errors import SettingError
 from algid.model import K3, K5, moments_of
-from algid.options import flag
+from algid.notices import Remedy
 
 ALONG = 0.05  # of a link's inertia across: that about its own line, as of a stout bar
 _ENDS = 25.0  # how near the ends of the masses' range the search goes, in logits
@@ -111,7 +111,7 @@ def links_of(
         half = math.sqrt(square) if square > 0 else -math.inf
         low, high = max(low, middle - half), min(high, middle + half)
     if not (low < high and (m2 is None or low < m2 < high)):
-        given = ", ".join(f"{flag(name)} {value:g}" for name, value in knowns.items())
+        given = Remedy(knowns).words
         left = f"{low:.4g} to {high:.4g} kg are left" if low < high else "none is left"
         raise SettingError(
             f"{file}: with {given} a mass or an inertia comes out negative; of link 2's masses "

@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from algid.base.files import as_toml
-from algid.base.text import visible
+from algid.base.text import as_toml, visible
 from algid.base.units import names_of
 from algid.inspection.checks import Inspection
 from algid.readers.table import CHANNELS

@@ -294,8 +294,8 @@ class FitSummary(_Model):
         """
         import numpy as np
 
-        rows = zip(self.covariance_names, self.covariance, strict=True)
-        known = {name: dict(zip(self.covariance_names, row, strict=True)) for name, row in rows}
+        rows = zip(self.covariance_names, self.covariance, strict=False)
+        known = {name: dict(zip(self.covariance_names, row, strict=False)) for name, row in rows}
         found = [[known.get(one, {}).get(other) for other in names] for one in names]
         return np.array(found, dtype=np.float64).reshape(len(names), len(names))
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from algid.base.criteria import UNDETERMINED
 from algid.base.errors import ResultError
@@ -121,7 +121,7 @@ class _File(BaseModel):
     """What is read of ``track.json``; it holds more, which follows from this."""
 
     version: str
-    stretches: list[Stretch]
+    stretches: list[Stretch] = Field(min_length=1)
     changes: list[dict[str, float]]
     explained: float
     excess: float
@@ -157,8 +157,8 @@ def read_track(folder: Path) -> TrackResult:
     except ValidationError as error:
         raise ResultError(f"{path}: {first_misfit(error)}; {again}") from error
     parts = list(blocks(folder / CURVE, COLUMNS))
-    if not parts:
-        raise ResultError(f"{folder / CURVE}: it holds no rows; {again}")
+    if not parts or not all(np.all(part["high"] >= part["m_p"]) for part in parts):
+        raise ResultError(f"{folder / CURVE}: it holds no rows, or rows without interval; {again}")
     t, m_p, high, stretch, left = (
         np.concatenate([part[name] for part in parts]) for name in COLUMNS
     )

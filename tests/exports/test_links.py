@@ -160,9 +160,9 @@ POINT = {"l1": 0.4, "l2": 0.3}
 @pytest.mark.parametrize(
     ("to", "result", "known", "message"),
     [
-        ("urdf", ARM, {"m2": 5.0}, f"arm: with --set m2 5 {NEGATIVE} 0."),
-        ("urdf", ARM, {"m1": 0.01}, f"arm: with --set m1 0.01 {NEGATIVE} none is left"),
-        ("urdf", ARM, {"rotor1": 1.0}, f"arm: with --set rotor1 1 {NEGATIVE} none is left"),
+        ("urdf", ARM, {"m2": 5.0}, f"arm: with --set m2=5.0 {NEGATIVE} 0."),
+        ("urdf", ARM, {"m1": 0.01}, f"arm: with --set m1=0.01 {NEGATIVE} none is left"),
+        ("urdf", ARM, {"rotor1": 1.0}, f"arm: with --set rotor1=1.0 {NEGATIVE} none is left"),
         ("python", ARM, {"m1": 1.0}, "--set m1: python holds no such number; leave it out"),
         ("payload", ARM, {"l1": 1.0}, "--l1: payload holds no such number; leave it out"),
         ("payload", ARM, {}, "arm: the result has no payload; identify with --loaded LOG"),

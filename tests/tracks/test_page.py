@@ -159,3 +159,13 @@ def test_a_damaged_track_is_refused_in_one_line(
     ) as refused:
         read_track(folder)
     assert "\n" not in str(refused.value)
+
+
+def test_a_curve_without_rows_or_intervals_is_refused(result: TrackResult, tmp_path: Path) -> None:
+    write_track(result, tmp_path / "picking.track")
+    curve = tmp_path / "picking.track" / "track.parquet"
+    whole = pl.read_parquet(curve)
+    for damaged in (whole.head(0), whole.with_columns(high=pl.col("m_p") - 1.0)):
+        damaged.write_parquet(curve)
+        with pytest.raises(ResultError, match=r"track\.parquet: it holds no rows, or rows without"):
+            read_track(curve.parent)
