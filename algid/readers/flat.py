@@ -241,6 +241,9 @@ def _sources(offered: Offered, profile: Profile) -> dict[str, str]:
     if missing:
         text = f"{offered.path}: no column for {', '.join(missing)}; found {offered.listed()}; "
         text += f"name them: {_naming(missing)}"
+        if "column 1" in offered.fields:  # there is no header
+            named = Remedy({"columns": ["t", "theta1", "theta2", "tau1", "tau2"]})
+            text += f", or all of them in their order, as {named}"
         if "t" in missing:
             rate = "; or give the samples a second of a log without a time"
             text += str(Remedy({"rate": None}, rate))
