@@ -28,7 +28,7 @@ SHARES = {
     "JOINTS_CONTRADICT": 1 / 11,
     "TORQUE_GAIN": 1 / 11,
     "LOGS_APART": 1 / 11,
-    "LENGTH_MISMATCH": 1 / 11,
+    "LENGTH_CONTRADICTED": 1 / 11,
     "FAR_FROM_TRUTH": 1 / 11,
 }
 """By code, what a check that chance can set off has of the budget; no more than all of it."""

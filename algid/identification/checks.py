@@ -237,9 +237,10 @@ def _of_length(found: Fitted) -> Iterator[Notice]:
         return
     length, std = by_constants
     if abs(length - given) > FAR_APART * std:
-        numbers = {"length": length, "half": found.fit.quantile * std, "given": given}
-        p_value = chance(abs(length - given) / std) if std else 0.0
-        yield Notice("LENGTH_MISMATCH", numbers=numbers | {"p_value": p_value})
+        distance = abs(length - given) / std if std else np.inf
+        numbers = {"case": "identified", "name": "l1", "given": given, "estimate": length}
+        numbers |= {"half": found.fit.quantile * std, "distance": distance}
+        yield Notice("LENGTH_CONTRADICTED", numbers=numbers | {"p_value": chance(distance)})
 
 
 def _of_arms(found: Fitted) -> Iterator[Notice]:
@@ -279,7 +280,7 @@ CHECKS = (
     Check("TORQUE_GAIN", _of_gains),
     Check("OTHER_UNIT", _of_mass),
     Check("NO_PAYLOAD", _of_payload),
-    Check("LENGTH_MISMATCH", _of_length),
+    Check("LENGTH_CONTRADICTED", _of_length),
     Check("LOGS_APART", _of_arms),
 )
 """Checks of a finished fit, in order. What is checked while it is made has its share in

@@ -37,6 +37,7 @@ CAUSES = (
     "WRONG_ZERO",
     "EXTERNAL_EFFORT",
     "GRAVITY_COMPENSATED:arm",
+    "LENGTH_CONTRADICTED",
     "SENSOR_FAULT:angle",
     "SENSOR_FAULT:torque",
     "LOST_SAMPLES",
@@ -65,8 +66,8 @@ def _failure(result: Result) -> str | None:
         if has_code(result.notices, "OTHER_JOINTS") and not worse and not broken:
             return "other joints of the arm move"
         return next((one.text for one in worse + broken), "physics forbids these estimates")
-    if has_code(result.notices, "LENGTH_CONTRADICTED"):
-        return "a link length contradicts the arm's result"
+    if has_code(result.notices, "LENGTH_CONTRADICTED") and result.payload:
+        return "a link length contradicts the arm's constants"
     asked = requested(result).values()
     usable = [one for one in asked if one.usable]
     # a number whose interval is merely around zero is none to use, nor has a prior measured one

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+import algid
 from algid.estimators.combine import LogInformation
 from algid.estimators.fit import Fit
 from algid.estimators.prediction import PredictionScore
@@ -222,13 +223,20 @@ def test_a_length_that_the_constants_contradict_is_named() -> None:
     std = 0.01 * math.sqrt(2) * ARM.l1
     for times, told in ((0.99 * ACCUSED, False), (1.01 * ACCUSED, True)):
         fit = fit_of(lengths={"l1": ARM.l1 + times * std})
-        assert bool(found(fit, "LENGTH_MISMATCH")) is told
-    (one,) = found(fit, "LENGTH_MISMATCH")
+        assert bool(found(fit, "LENGTH_CONTRADICTED")) is told
+    (one,) = found(fit, "LENGTH_CONTRADICTED")
     given = ARM.l1 + 1.01 * ACCUSED * std
-    p_value = 2 * norm.sf(1.01 * ACCUSED)
-    assert one.numbers == pytest.approx(
-        {"length": ARM.l1, "half": QUANTILE * std, "given": given, "p_value": p_value}
+    assert {name: one.numbers[name] for name in ("estimate", "half", "given", "distance")} == (
+        pytest.approx(
+            {
+                "estimate": ARM.l1,
+                "half": QUANTILE * std,
+                "given": given,
+                "distance": 1.01 * ACCUSED,
+            }
+        )
     )
+    assert one.numbers["p_value"] == pytest.approx(2 * norm.sf(1.01 * ACCUSED))
 
 
 def notes(**changes: Any) -> list[Notice]:
@@ -296,3 +304,17 @@ def test_a_check_that_doubts_takes_the_error_bars_of_the_rigid_arm_alone(
     assert {name for name, word in marked.items() if word == "WEAK_EXCITATION"} == set(RIGID[:5])
     assert fit.notes == (seen,)
     assert not list(remarks(Fitted(fit_of())))  # it is said once, among the fit's notes
+
+
+def test_a_length_that_contradicts_the_logs_fails_their_payload_and_leads_its_reasons() -> None:
+    unloaded, loaded = algid.synthesise(
+        "case1", torque="wide", duration=3.0, position_noise=1e-3, torque_noise=1e-2
+    )
+    wrong = algid.identify(unloaded, loaded=loaded, l1=0.15).verdict
+    assert wrong.grade == "failed"
+    assert wrong.reasons[0].code == "LENGTH_CONTRADICTED"
+    alone = algid.identify(unloaded, l1=0.15).verdict
+    assert (alone.grade, alone.reasons[0].code) == ("reservations", "LENGTH_CONTRADICTED")
+    right = algid.identify(unloaded, loaded=loaded, l1=0.162).verdict
+    assert right.grade != "failed"
+    assert "LENGTH_CONTRADICTED" not in {one.code for one in right.reasons}
