@@ -54,7 +54,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "moved": room("errors options"),
     "results": room(
-        "errors files log model names notices options settings significance text "
+        "criteria errors files log model names notices options settings significance text "
         "verdict", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm estimators limits log model names results synth"),

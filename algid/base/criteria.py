@@ -28,5 +28,7 @@ SETTLED = 0.02
 SETTLED_SIMULATED = 0.05
 """The same where each further round simulates every window anew."""
 
+SAME_LENGTH = 0.01
+"""Share of a length: what two rulers differ by."""
 UNDETERMINED = 0.5
 """Standard deviation relative to a parameter's size: what is less sure is not determined."""

@@ -36,7 +36,7 @@ from algid.estimators.diagnostics import (
     payload_distance,
 )
 from algid.estimators.excitation import contradicted, undriven
-from algid.estimators.fit import Fit
+from algid.estimators.fit import Fit, solved_anew
 from algid.estimators.prediction import PredictionScore
 from algid.estimators.robust import unshrunk
 from algid.identification.by_likelihood import Fitted
@@ -231,15 +231,30 @@ def _of_payload(found: Fitted) -> Iterator[Notice]:
 
 
 def _of_length(found: Fitted) -> Iterator[Notice]:
-    """That a given l1 is not that of the constants, g k1 / k2."""
-    given, by_constants = found.fit.shared.lengths.get("l1"), length_by_constants(found.fit)
-    if given is None or by_constants is None:
-        return
-    length, std = by_constants
-    if abs(length - given) > FAR_APART * std:
-        distance = abs(length - given) / std if std else np.inf
-        numbers = {"case": "identified", "name": "l1", "given": given, "estimate": length}
-        numbers |= {"half": found.fit.quantile * std, "distance": distance}
+    """That a given length is not what the logs show.
+
+    l1 is g k1 / k2 of the constants, and both are the payload's where the same likelihoods are
+    solved without the given ones.
+    """
+    fit = found.fit
+    given, measured = fit.shared.lengths, list[tuple[str, float, float]]()
+    if "l1" in given and (by_constants := length_by_constants(fit)) is not None:
+        measured.append(("l1", *by_constants))
+    if given and fit.shared.payload:
+        shared = replace(fit.shared, lengths={})
+        value = dict(zip(fit.names, fit.values.tolist(), strict=True)) | given
+        start = np.array([value[name] for name in shared.names])
+        free = solved_anew(fit, shared, start, fit.prior, fit.shrinkage)
+        by_name = zip(free.names, free.values.tolist(), free.std.tolist(), strict=True)
+        measured += [one for one in by_name if one[0] in given]
+    said = set[str]()
+    for name, length, std in measured:
+        if name in said or not abs(length - given[name]) > FAR_APART * std:
+            continue
+        said.add(name)
+        distance = abs(length - given[name]) / std if std else np.inf
+        numbers = {"case": "identified", "name": name, "given": given[name], "estimate": length}
+        numbers |= {"half": fit.quantile * std, "distance": distance}
         yield Notice("LENGTH_CONTRADICTED", numbers=numbers | {"p_value": chance(distance)})
 
 

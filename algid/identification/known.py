@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.base.criteria import SAME_LENGTH
 from algid.base.errors import ResultError
 from algid.base.names import outside, vector, within
 from algid.base.significance import CERTAIN, sigmas
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
 FAR = sigmas(CERTAIN)  # beyond which two statements contradict each other
-SAME_LENGTH = 0.01  # of a length: what two rulers differ by
 
 
 def model_of(result: Result) -> Model:

@@ -36,14 +36,14 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import Arm, FloatArray
-from algid.base.criteria import STILL
+from algid.base.criteria import SAME_LENGTH, STILL
 from algid.base.errors import ResultError, SettingError
 from algid.base.names import outside, places_outside, vector
 from algid.base.significance import LEVEL, chance
 from algid.estimators.combine import likelihood, scaled_pinv
 from algid.estimators.fit import Fit
 from algid.estimators.identifiability import SHARE, open_directions
-from algid.identification.known import SAME_LENGTH, covariance_of, with_error_bar
+from algid.identification.known import covariance_of, with_error_bar
 from algid.identification.urdf import arm_of
 from algid.model import RIGID, UNITS
 from algid.notices import Notice

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Sequence
+from math import isclose
 from typing import TYPE_CHECKING
 
+from algid.base.criteria import SAME_LENGTH
 from algid.base.names import outside
 from algid.base.significance import SURE
 from algid.base.text import counted, percent, significant, visible
@@ -66,7 +68,7 @@ def _failure(result: Result) -> str | None:
         if has_code(result.notices, "OTHER_JOINTS") and not worse and not broken:
             return "other joints of the arm move"
         return next((one.text for one in worse + broken), "physics forbids these estimates")
-    if has_code(result.notices, "LENGTH_CONTRADICTED") and result.payload:
+    if result.payload and wrong_length(result.notices):
         return "a link length contradicts the arm's constants"
     asked = requested(result).values()
     usable = [one for one in asked if one.usable]
@@ -76,6 +78,15 @@ def _failure(result: Result) -> str | None:
     if len(usable) < LEAST_USABLE * len(asked):
         return f"only {len(usable)} of {counted(len(asked), 'parameter')} could be identified"
     return None
+
+
+def wrong_length(notices: Sequence[Notice]) -> bool:
+    """Whether a given length is further from what is known of it than rulers differ."""
+    for one in of_codes(notices, "LENGTH_CONTRADICTED"):
+        known = one.numbers.get("stated", one.numbers.get("estimate"))
+        if known is None or not isclose(one.numbers["given"], known, rel_tol=SAME_LENGTH):
+            return True
+    return False
 
 
 def _broken_bounds(result: Result) -> list[Notice]:

@@ -15,14 +15,14 @@ from algid.base.criteria import HOLE
 from algid.base.significance import NORMAL
 from algid.base.text import counted, file_name, formatted, joined, resolved, significant
 from algid.base.verdict import Verdict, graded
-from algid.notices import Notice, has_code, lossy, notes_of, warnings_of
+from algid.notices import Notice, lossy, notes_of, warnings_of
 from algid.report.document import Document, Section, Table
 from algid.report.export import write_mcap
 from algid.report.plot import Panels
 from algid.report.render import markdown, page, write_texts
 from algid.report.series import reduced
 from algid.report.tables import log_tables, provenance_table, settings_table
-from algid.results.verdict import LEAST_R2, WORST_R2, share_text
+from algid.results.verdict import LEAST_R2, WORST_R2, share_text, wrong_length
 from algid.tracks.cells import CELL
 from algid.tracks.payload import HALF_BAND, Stretch
 from algid.tracks.result import CURVE, FILE, StretchStatus, TrackResult, track_json, write_tables
@@ -173,7 +173,7 @@ def verdict(result: TrackResult) -> Verdict:
     # why the masses must not be used
     failure, asked = None, "is it this arm, in these units?"
     negative = statuses.count(StretchStatus.NEGATIVE_MASS)
-    if has_code(result.notices, "LENGTH_CONTRADICTED"):
+    if wrong_length(result.notices):
         failure = "a link length contradicts the arm's result"
     elif track.explained < WORST_R2:
         share = max(100 * track.explained, 0)

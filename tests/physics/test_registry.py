@@ -287,7 +287,7 @@ def add_options(package: Path) -> None:
     inserted(
         package / "settings.py",
         "    constrain: bool = False",
-        "    toy_level: float = field(1.0, (0.0, 5.0))\n",
+        "    toy_level: float = within((0.0, 5.0), 1.0)\n",
     )
     inserted(
         package / "settings.py",

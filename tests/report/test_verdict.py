@@ -29,6 +29,11 @@ WEAK = Estimate(estimate=None, unit="kg m^2", status=Status.WEAK_EXCITATION)
 HANGING = Notice("WRONG_ZERO", numbers={"turn": -90.0}, remedies=(Remedy({"zero": "hanging"}),))
 OTHERS = Notice("OTHER_JOINTS", numbers={"count": 1, "joints": "wrist", "samples": 9})
 REFUTED = Notice("REFUTED", numbers={"case": "noise", "kept": "weak"})
+NEAR = Notice(
+    "LENGTH_CONTRADICTED",
+    numbers={"case": "identified", "name": "l1", "given": 0.3, "estimate": 0.3025, "half": 1e-3,
+             "distance": 5.0},
+)  # fmt: skip
 LENGTH = Notice(
     "LENGTH_CONTRADICTED", numbers={"case": "stated", "name": "l1", "given": 0.3, "stated": 0.2}
 )
@@ -139,6 +144,9 @@ CASES = {
     ),
     "a length": Case(
         lambda r: noticed(r, LENGTH), "failed", ["LENGTH_CONTRADICTED"], "a link length contradict"
+    ),
+    "a length as rulers differ": Case(
+        lambda r: noticed(r, NEAR), codes=["LENGTH_CONTRADICTED"]
     ),
     "the worst bound first": Case(
         lambda r: implausible(r, broken_bounds=[*broken(4.0)["broken_bounds"], WORSE]),
