@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from algid.api.convert import convert, read_log, write_log
     from algid.api.design import design
     from algid.api.export import export
-    from algid.api.identify import Result, identify, read_result
+    from algid.api.identify import identify
     from algid.api.inspect import inspect
+    from algid.api.result import Result, read_result
     from algid.api.synth import synthesise
     from algid.api.track import track
     from algid.api.validate import validate
@@ -62,7 +63,7 @@ _HOMES = {
     "Arm": "algid.arm",
     "Log": "algid.log",
     "Profile": "algid.profile",
-    "Result": "algid.api.identify",
+    "Result": "algid.api.result",
     "Settings": "algid.settings",
     "batch": "algid.api.batch",
     "compare": "algid.api.compare",
@@ -72,7 +73,7 @@ _HOMES = {
     "identify": "algid.api.identify",
     "inspect": "algid.api.inspect",
     "read_log": "algid.api.convert",
-    "read_result": "algid.api.identify",
+    "read_result": "algid.api.result",
     "simulate": "algid.synth.simulator",
     "synthesise": "algid.api.synth",
     "track": "algid.api.track",

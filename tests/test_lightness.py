@@ -46,15 +46,15 @@ finally:
     plugins = "pydantic.plugin._loader" in sys.modules
     found = sys.modules["pydantic.plugin._loader"]._plugins if plugins else None
     seldom, spared = gc.get_threshold()[0] >= 10 * usual[0], gc.get_freeze_count() > 0
-    print(seldom, spared, found, file=sys.stderr)
+    print(seldom, spared, found, "numpy" in sys.modules, file=sys.stderr)
 """
 
 
-def test_a_command_hardly_searches_for_cycles_and_not_for_plugins() -> None:
+def test_help_loads_no_numbers_and_hardly_searches_for_cycles_or_plugins() -> None:
     done = subprocess.run([sys.executable, "-c", COMMAND], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     # of the command, then of the process that guards it
-    assert done.stderr.splitlines() == ["True True None", "False False None"]
+    assert done.stderr.splitlines() == ["True True None False", "False False None False"]
 
 
 @pytest.mark.parametrize("name", ["log.csv", "log.feather", "log.npz"])
