@@ -17,7 +17,7 @@ from algid.notices import Notice, Remedy, flat, has_code, notes_of, of_codes, wa
 from algid.options import flag
 
 if TYPE_CHECKING:
-    from algid.results.model import Estimate, Result
+    from algid.results.model import Estimate, Result, TorquePrediction
 
 CONSTANTS = (K1, K2, K3, K4, K5, K6, K7)
 LEAST_R2 = 0.9  # below, a tenth of the torque's power is not the model's
@@ -63,7 +63,7 @@ def _failure(result: Result) -> str | None:
     statuses = {one.status for one in result.estimates.values()}
     if "NOT_CONVERGED" in statuses or (result.fit is not None and not result.fit.converged):
         return "the estimator did not converge"
-    worse, broken = _worse_than_mean(result), _broken_bounds(result)
+    worse, broken = _unexplained(result), _broken_bounds(result)
     if "IMPLAUSIBLE" in statuses or worse:
         if has_code(result.notices, "OTHER_JOINTS") and not worse and not broken:
             return "other joints of the arm move"
@@ -100,11 +100,25 @@ def _broken_bounds(result: Result) -> list[Notice]:
     return notices
 
 
-def _worse_than_mean(result: Result) -> list[Notice]:
-    """Joints whose torque a constant predicts better, if there is something to explain."""
+def _unexplained(result: Result) -> list[Notice]:
+    """Joints of whose torque most is not the model's, if there is something to explain.
+
+    Where the likelihood stands that is noise, and where a parameter is open that is what it would
+    make: a model fails only beside a constant there.
+    """
     found = None if result.fit is None else result.fit.prediction
-    joints = () if found is None else found.unexplained(least=0.0)
-    return [Notice("LITTLE_EXPLAINED", numbers={"case": "mean", "joint": one}) for one in joints]
+    if found is None:
+        return []
+    least = WORST_R2 if result.complete and has_code(result.notices, "REFUTED") else 0.0
+    return [_explained(found, joint) for joint in found.unexplained(least)]
+
+
+def _explained(found: TorquePrediction, joint: int) -> Notice:
+    """How little of a joint's torque (1 or 2) is explained."""
+    r2, numbers = found.r2[joint - 1], dict[str, object](case="mean", joint=joint)
+    if r2 >= 0:
+        numbers |= {"case": "part", "percent": 100 * r2, "band": found.band}
+    return Notice("LITTLE_EXPLAINED", numbers=numbers)
 
 
 def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
@@ -112,7 +126,7 @@ def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
     doubts, fit = warnings_of(result.notices), result.fit
     causes = [one for cause in CAUSES for one in of_codes(doubts, cause)]
     implausible = any(one.status == "IMPLAUSIBLE" for one in result.estimates.values())
-    if failed and not causes and (implausible or _worse_than_mean(result)):
+    if failed and not causes and (implausible or _unexplained(result)):
         yield Notice("UNKNOWN_CAUSE")
     yield from causes
     for one in of_codes(doubts, "SATURATED_EFFORT", "CLIPPED_TORQUE"):
@@ -140,11 +154,8 @@ def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
             yield Notice("NOT_WHITE", numbers={"names": coloured})
         elif fit.intervals == "likelihood":
             least = 0.0  # what is left of a torque is its sensors' noise
-        for joint, r2 in enumerate(() if found is None else found.r2, start=1):
-            if found is not None and r2 < least:
-                part = {"case": "part", "percent": 100 * r2, "band": found.band}
-                kind = part if r2 >= 0 else {"case": "mean"}
-                yield Notice("LITTLE_EXPLAINED", numbers=kind | {"joint": joint})
+        if found is not None:
+            yield from (_explained(found, one) for one in (1, 2) if found.r2[one - 1] < least)
     far = [
         f"{visible(row.parameter)} ({significant(distance, 2)} σ)"
         for row in result.table4

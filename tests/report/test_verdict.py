@@ -164,6 +164,14 @@ CASES = {
     "R² of 55 % by noise": Case(
         lambda r: with_fit(r, intervals="likelihood", whiteness={}, **predicted(0.55, 0.99)), "good"
     ),
+    "R² of 49 % by what the model lacks": Case(
+        lambda r: noticed(with_fit(r, intervals="sandwich", **predicted(0.49, 0.99)), REFUTED),
+        "failed", ["UNKNOWN_CAUSE", "REFUTED"], "only 49 % of the torque of joint 1",
+    ),
+    "R² of 51 % by what the model lacks": Case(
+        lambda r: noticed(with_fit(r, intervals="sandwich", **predicted(0.51, 0.99)), REFUTED),
+        codes=["REFUTED", "LITTLE_EXPLAINED"],
+    ),
     "worse than the mean": Case(
         lambda r: with_fit(r, **predicted(-0.14, 0.99)), "failed", ["UNKNOWN_CAUSE"], "joint 1"
     ),
