@@ -4,7 +4,8 @@ Five arms, each link's centre of mass 0, 10 or 30° off its line, carry a payloa
 gyration 0, 2, 5 or 15 cm, on link 2's line and 20° off it. Every pair of logs is identified with no
 flag. A row gives how many of the 95 % intervals hold the truth, by parameter, and how many results
 failed. Phases and inertias of 1 to 3 of their own standard deviations, where the logs choose one or
-the other, are its last rows. The first table has what phases and body cost: standard deviations
+the other, are rows of their own; the last ones are given lengths, true ones and some 5 % off, which
+LENGTH_CONTRADICTED accuses. The first table has what phases and body cost: standard deviations
 with them over those without, on a straight arm, of algid, of algid as the logs choose, and of the
 Cramér-Rao bound, which shares nothing with it.
 """
@@ -27,7 +28,9 @@ from algid.estimators.problem import Problem, WeakSettings
 from algid.identification.identify import identify
 from algid.log import Log
 from algid.model import Model
+from algid.notices import has_code
 from algid.results import Result
+from algid.settings import Settings
 from algid.signals.segments import Segment
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
@@ -55,18 +58,24 @@ class Row:
     off: float = 0.0
     small: float = 0.0
     """Phases and inertia are so many of their own standard deviations (`SMALL`)."""
+    given: tuple[str, ...] = ()
+    wrong: float = 0.0
+    """Lengths that are given, and what share they are too long."""
 
     @property
     def title(self) -> str:
         """Its cells."""
         if self.small:
             return f"{self.small:g} σ | {self.small:g} σ | 0°"
-        return f"{self.centre:g}° | {100 * self.radius:g} cm | {self.off:g}°"
+        cells = f"{self.centre:g}° | {100 * self.radius:g} cm | {self.off:g}°"
+        return cells + "".join(f", {one} {self.wrong:+.0%}" for one in self.given)
 
 
 ROWS = (
     *(Row(*each) for each in product((0.0, 10.0, 30.0), (0.0, 0.02, 0.05, 0.15), (0.0, 20.0))),
     *(Row(small=size) for size in (1.0, 2.0, 3.0)),
+    *(Row(given=each) for each in (("l1",), ("l2",), ("l1", "l2"))),
+    *(Row(given=(one,), wrong=0.05) for one in ("l1", "l2")),
 )
 SMALL = {
     "case1": (0.1, 4.2e-3),
@@ -113,7 +122,9 @@ def drawn(name: str, row: Row, seed: int) -> Result:
     """The result of one draw."""
     rng = np.random.default_rng([seed, sum(name.encode())])
     unloaded, loaded = (noisy(motion, rng) for motion in motions(name, row))
-    return identify(unloaded, loaded, report=False)
+    true = truth(*scene(name, row))
+    given = {one: float((1 + row.wrong) * true[one]) for one in row.given}
+    return identify(unloaded, loaded, Settings.model_validate(given), report=False)
 
 
 def noisy(motion: SimulatedMotion, rng: np.random.Generator) -> Log:
@@ -124,7 +135,9 @@ def noisy(motion: SimulatedMotion, rng: np.random.Generator) -> Log:
 def draw(row: Row, name: str, number: int) -> Seen:
     """One draw; what a result leaves out is nothing, exactly."""
     result = drawn(name, row, APART * ROWS.index(row) + number)
-    return judged(result, truth(*scene(name, row)))
+    seen = judged(result, truth(*scene(name, row)))
+    seen["accused"] = [1] * has_code(result.notices, "LENGTH_CONTRADICTED")
+    return seen
 
 
 def costs() -> Iterator[str]:
@@ -196,6 +209,6 @@ def _segment(motion: SimulatedMotion, rng: np.random.Generator) -> Segment:
 if __name__ == "__main__":
     print("\n".join(costs()), flush=True)
     rows = grid({row.title: (row,) for row in ROWS}, ARMS)
-    columns = {"draws": count("draw"), "failed": count("failed")}
+    columns = {"draws": count("draw"), "failed": count("failed"), "accused": count("accused")}
     columns |= {name: share(f"held {name}") for name in (*NAMES, *PAYLOAD)}
     experiment("planar", __doc__, rows, draw, columns, draws=40)
