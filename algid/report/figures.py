@@ -228,7 +228,7 @@ def inertia(result: Result, raw: Drawn | None) -> Panels | None:
         panels.band(0, degrees, value - wide, value + wide, "95 % interval")
         panels.add(0, degrees, value, name)
     if raw is not None:
-        reached = np.degrees(raw["theta2"])
+        reached = (np.degrees(raw["theta2"]) + 180.0) % 360.0 - 180.0
         panels.mark(0, "reached", np.nanmin(reached), np.nanmax(reached))
     smallest = np.linalg.eigvalsh(np.array([m[:2], m[1:]]).T).min()
     panels.note = f"The smallest eigenvalue of M is {significant(float(smallest), 3)} kg m²."

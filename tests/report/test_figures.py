@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -172,9 +173,14 @@ def test_the_mass_matrix_has_the_spread_of_draws(result: Result, raw: Drawn) -> 
     straight = [[k5 + k3 + 2 * k1, k3 + k1], [k3 + k1, k3]]  # where M is the closest to singular
     smallest = float(np.linalg.eigvalsh(straight)[0])
     assert f"M is {significant(smallest, 3)} kg" in plot.note
-    (reached,) = plot.layout["shapes"]
     turned = np.degrees(raw["theta2"])
-    assert (reached["x0"], reached["x1"]) == (np.nanmin(turned), np.nanmax(turned))
+    ends = pytest.approx((np.nanmin(turned), np.nanmax(turned)))
+    for turns in (0, 3):  # the axis is one turn
+        further = {"theta2": np.radians(turned + 360 * turns)}
+        shown = inertia(result, replace(raw, columns={**raw.columns, **further}))
+        assert shown is not None
+        (reached,) = shown.layout["shapes"]
+        assert (reached["x0"], reached["x1"]) == ends
     half = typed(bands[0]["y"])[place] - m11[place]
     assert half == pytest.approx(NORMAL * (draws @ factors).std(), rel=0.03)
 
