@@ -23,10 +23,11 @@ import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Metadata, Schema, Statistics
+from mcap.records import Channel, Chunk, Metadata, MetadataIndex, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC as MCAP
 from numpy.typing import NDArray
 
+from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.runtime import ahead
 from algid.base.text import counted
@@ -55,6 +56,7 @@ _KINDS: dict[int, tuple[Any, str]] = {
     Opcode.SCHEMA: (Schema, "id"),
     Opcode.CHANNEL: (Channel, "id"),
     Opcode.METADATA: (Metadata, "name"),
+    Opcode.METADATA_INDEX: (MetadataIndex, "name"),
     Opcode.STATISTICS: (Statistics, ""),
 }
 """Records that define something, and what they are known by."""
@@ -157,6 +159,8 @@ def mcap_file(path: Path) -> MessageFile:
             found.damage[:0] = [f"its summary: {why}"] if why else []
             found.look(stream, loose=False)
     metadata = records.get((Opcode.METADATA, KEY))
+    if metadata is None and (Opcode.METADATA_INDEX, KEY) in records:  # no checksum covers it
+        raise LogError(f"{path}: the truth in the MCAP file is damaged (no name); copy it again")
     with as_log_error(path, "truth in the MCAP"):
         truth = loads(metadata.metadata.get(KEY, "")).truth if metadata else None
     channels = {}

@@ -117,6 +117,11 @@ def track_json(result: TrackResult) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
+class _Arm(BaseModel):
+    path: str
+    sha256: str
+
+
 class _File(BaseModel):
     """What is read of ``track.json``; it holds more, which follows from this."""
 
@@ -128,7 +133,7 @@ class _File(BaseModel):
     bare: float
     holes: list[tuple[float, float]]
     schedule: tuple[tuple[float, float], ...] | None
-    arm: dict[str, str]
+    arm: _Arm
     settings: dict[str, Any]
     log: LogSummary
     data_lost: bool
@@ -177,8 +182,8 @@ def read_track(folder: Path) -> TrackResult:
             tip_equivalent=file.bare,
         ),
         log=file.log,
-        arm=file.arm["path"],
-        arm_sha256=file.arm["sha256"],
+        arm=file.arm.path,
+        arm_sha256=file.arm.sha256,
         settings=file.settings,
         version=file.version,
         schedule=file.schedule,

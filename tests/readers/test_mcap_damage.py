@@ -326,15 +326,14 @@ def test_the_truth_in_the_metadata_is_read_where_it_can_be(tmp_path: Path) -> No
     content = path.read_bytes()
     name = b"\x05\0\0\0algid"
     place = content.index(name, content.index(name) + 1)  # the header has it too
-    path.write_bytes(content[:place] + b"\x05\0\0\0other" + content[place + 9 :])
-    found = read_log(path)
-    assert (same(found, LOG), found.origin.truth) == (True, None)
-    path.write_bytes(content.replace(b'"arm"', b'"mra"'))
-    with pytest.raises(
-        LogError,
-        match=rf"^{path}: the truth in the MCAP file is damaged .*ValueError.*; copy it again$",
-    ):
-        read_log(path)
+    other = content[:place] + b"\x05\0\0\0other" + content[place + 9 :]  # the index knows its name
+    for damaged in (other, content.replace(b'"arm"', b'"mra"')):
+        path.write_bytes(damaged)
+        with pytest.raises(
+            LogError,
+            match=rf"^{path}: the truth in the MCAP file is damaged .*(Error|no name).*; copy",
+        ):
+            read_log(path)
 
 
 @pytest.mark.parametrize("packed", CompressionType)

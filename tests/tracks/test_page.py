@@ -147,15 +147,15 @@ def test_a_track_is_read_back_as_it_was(result: TrackResult, tmp_path: Path) -> 
     np.testing.assert_allclose(again.track.std, result.track.std, rtol=1e-9)
 
 
-@pytest.mark.parametrize("damage", ['{"stretches": []}', "[]", "{", '{"stretches": 3}'])
+@pytest.mark.parametrize("damage", ['{"stretches": []}', "[]", "{", '{"stretches": 3}', ""])
 def test_a_damaged_track_is_refused_in_one_line(
     result: TrackResult, tmp_path: Path, damage: str
 ) -> None:
     folder = tmp_path / "picking.track"
     write_track(result, folder)
-    (folder / "track.json").write_text(damage)
+    (folder / "track.json").write_text(damage or track_json(result).replace('"sha256"', '"sum"'))
     with pytest.raises(
-        ResultError, match=r"track\.json: (not JSON|.*(required|expected|valid))"
+        ResultError, match=r"track\.json: (not JSON|.*(required|expected|valid|sha256))"
     ) as refused:
         read_track(folder)
     assert "\n" not in str(refused.value)
