@@ -171,11 +171,20 @@ def with_error_bar(result: Result, names: Iterable[str]) -> tuple[str, ...]:
 
 
 def covariance_of(result: Result, names: Sequence[str], uncertain: Collection[str]) -> FloatArray:
-    """Covariance (n, n) of the parameters `names`: zero for those that are not `uncertain`."""
+    """Covariance (n, n) of the parameters `names`: zero for those that are not `uncertain`.
+
+    Raises
+    ------
+    ResultError
+        If the result does not know it.
+    """
     covariance = np.zeros((len(names), len(names)))
     rows = np.flatnonzero(np.isin(names, list(uncertain)))
     if rows.size and result.fit is not None:
         covariance[np.ix_(rows, rows)] = result.fit.covariance_of(within(names, uncertain))
+    if np.isnan(covariance).any():
+        of = ", ".join(within(names, uncertain))
+        raise ResultError(f"{result.log.path}: its result has no covariance of {of}; identify anew")
     return covariance
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -138,6 +139,12 @@ def test_an_earlier_result_is_a_prior_by_its_own_covariance(tmp_path: Path) -> N
     assert Status.FROM_PRIOR in statuses
     for name in RIGID:
         assert (result.parameters[name].std or 1) <= 1.05 * (first.parameters[name].std or 0)
+    file = tmp_path / "first.algid" / "result.json"
+    content = json.loads(file.read_text())
+    content["fit"]["covariance"][0] = []
+    file.write_text(json.dumps(content))
+    with pytest.raises(AlgidError, match="its result has no covariance of k1, k2"):
+        algid.identify(log_of(ARM, "faint", SEED), prior=folder)
 
 
 def test_a_profile_names_it(cad: Path) -> None:
