@@ -129,7 +129,7 @@ def test_a_model_that_was_asked_for_and_does_not_hold_says_so() -> None:
 
 def test_the_likelihood_adds_a_term_that_the_weak_form_s_noise_hid() -> None:
     """Phases of a hundredth of a degree: nothing to windows, six deviations to the likelihood."""
-    result = planar.drawn("case2", planar.ROWS[-1], 7026)
+    result = planar.drawn("case2", planar.Row(small=3.0), 7026)
     assert result.estimator == "refined"
     assert result.fit is not None
     (trial,) = (one for one in result.fit.terms if one.term == "phases")
