@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from algid.base.names import outside, vector, within
+from algid.base.names import outside, within
 from algid.base.significance import sigmas
 from algid.estimators.combine import likelihood
 from algid.estimators.fit import Fit, solved_anew
@@ -127,9 +127,7 @@ def with_body_of(fit: Fit, body: Sequence[str]) -> Fit:
     if tuple(body) == fit.shared.body:
         return fit
     shared = replace(fit.shared, body=tuple(body))
-    known = dict(zip(fit.names, fit.values.tolist(), strict=True))
-    start = vector(shared.names, known, otherwise=0.0)
-    changed = solved_anew(fit, shared, start, fit.prior, fit.shrinkage)
+    changed = solved_anew(fit, shared, fit.prior, fit.shrinkage)
     status = list(changed.status)
     for name, before in zip(fit.names, fit.status, strict=True):
         if before != "OK" and name in changed.names:

@@ -11,7 +11,7 @@ import numpy as np
 
 from algid.arm import FloatArray, keep_arrays, read_only
 from algid.base.compiled import student_quantile
-from algid.base.names import outside, places_outside
+from algid.base.names import outside, places_outside, vector
 from algid.base.significance import NORMAL, level
 from algid.estimators.combine import (
     FEWEST_LOGS,
@@ -314,15 +314,17 @@ def finish(
     )
 
 
-def solved_anew(
-    fit: Fit, shared: Shared, start: FloatArray, prior: Prior | None, shrinkage: Prior | None
-) -> Fit:
-    """The fit of the same likelihoods, from `start` on, by other parameters or another prior."""
+def solved_anew(fit: Fit, shared: Shared, prior: Prior | None, shrinkage: Prior | None) -> Fit:
+    """The fit of the same likelihoods by other parameters or another prior.
+
+    It starts from what the fit knows, given lengths included; what is new is zero.
+    """
+    known = dict(zip(fit.names, fit.values.tolist(), strict=True)) | fit.shared.lengths
     return finish(
         fit.estimator,
         shared,
         fit.logs,
-        start,
+        vector(shared.names, known, otherwise=0.0),
         fit.moved,
         prior,
         coloured=fit.intervals != "likelihood",

@@ -594,7 +594,7 @@ def unshrunk(fit: Fit, name: str) -> Fit:
     if prior is None or shrinkage is None or name not in shrinkage.names:
         return fit
     silent = prior.silent_on((name,)), shrinkage.silent_on((name,))
-    return solved_anew(fit, fit.shared, fit.values, *silent)
+    return solved_anew(fit, fit.shared, *silent)
 
 
 def of_passive_joint(problem: Problem) -> Fit | None:

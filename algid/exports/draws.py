@@ -28,7 +28,7 @@ from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.exports.description import describe
 from algid.exports.formats import ROBOTS, SUFFIXES, takes, written
 from algid.exports.links import Knowns
-from algid.identification.known import model_of, prior_of, with_error_bar
+from algid.identification.known import covariance_of, model_of, prior_of, with_error_bar
 from algid.notices import Notice
 from algid.options import flag
 from algid.results import Result
@@ -66,8 +66,7 @@ def drawn_files(
     names = (*arm, *with_error_bar(result, others))
     mean = np.array([result.estimates[name].estimate for name in names], dtype=np.float64)
     best = describe(result, file, knowns, links=links)
-    assert result.fit is not None  # or there is no prior
-    covariance = result.fit.covariance_of(names)
+    covariance = covariance_of(result, names, names)
     size = np.sqrt(np.diag(covariance))
     size[size == 0] = 1.0
     still, correlation = np.zeros(len(names)), covariance / np.outer(size, size)

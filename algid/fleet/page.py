@@ -80,10 +80,10 @@ def verdict(history: History) -> Verdict:
 def robot_table(history: History, links: Links) -> Table:
     """Every robot: its latest log, how many logs, how many findings, and their dates."""
     counts, rows = dict(history.findings["robot"].value_counts().iter_rows()), []
-    for robot, logs, _, first, last, latest, tested in history.roster.head(MOST_ROWS).iter_rows():
-        found = counts.get(robot) or ("none" if tested else "not tested")
-        own = visible(latest), visible(robot), str(logs), str(found), _day(first), _day(last)
-        rows.append(own)
+    for row in history.roster.head(MOST_ROWS).iter_rows(named=True):
+        found = counts.get(row["robot"]) or ("none" if row["tested"] else "not tested")
+        own = (visible(row["latest"]), visible(row["robot"]), str(row["logs"]), str(found))
+        rows.append((*own, _day(row["first"]), _day(row["last"])))
     columns, cut = "Latest log | Robot | Logs | Findings | From | To", _cut(history.roster, "robot")
     return Table("Robots", columns, rows, cut, links)
 
@@ -91,15 +91,15 @@ def robot_table(history: History, links: Links) -> Table:
 def finding_table(history: History, links: Links) -> Table:
     """Drifts, steps, payloads unlike their labels and outliers, of each the clearest first."""
     rows = []
-    for row in history.findings.head(MOST_ROWS).iter_rows():
-        kind, robot, job, parameter, time, before, value, half, expected, sigmas = row
-        by, when = f"{percent(value, expected, 3)} ± {percent(half, expected)} %", _day(time)
+    for row in history.findings.head(MOST_ROWS).iter_rows(named=True):
+        value, half, expected, when = row["value"], row["half"], row["expected"], _day(row["time"])
+        by = f"{percent(value, expected, 3)} ± {percent(half, expected)} %"
         if half is None:
             by = f"{significant(value)} for {significant(expected)}"
-        if before:
-            when = f"{_day(before)} to {when}"
-        own = visible(job), visible(robot), parameter, kind, by, significant(sigmas, 2), when
-        rows.append(own)
+        if row["before"]:
+            when = f"{_day(row['before'])} to {when}"
+        own = (visible(row["job"]), visible(row["robot"]), row["parameter"], row["kind"])
+        rows.append((*own, by, significant(row["sigmas"], 2), when))
     note = (
         f"± is 95 %. A drift is a slope a month over {SPAN} months with p < "
         f"{significant(ALPHA, 1)}; a step, where an arm, a drive or a convention was replaced, has "

@@ -25,7 +25,7 @@ import numpy as np
 
 from algid import results
 from algid.arm import FloatArray
-from algid.base.significance import CERTAIN, chance, sigmas
+from algid.base.significance import chance
 from algid.base.units import TORQUE
 from algid.estimators.diagnostics import (
     FAR_BEYOND,
@@ -40,6 +40,7 @@ from algid.estimators.fit import Fit, solved_anew
 from algid.estimators.prediction import PredictionScore
 from algid.estimators.robust import unshrunk
 from algid.identification.by_likelihood import Fitted
+from algid.identification.known import FAR, contradicting
 from algid.identification.passes import problem_of
 from algid.identification.recordings import Recording
 from algid.identification.series import predictor_of_fit
@@ -49,7 +50,6 @@ from algid.notices import Notice, Remedy, has_code
 
 STEEL, AIR = 8000.0, 1.2  # kg/m³
 LEAST_SURE = 10.0  # standard deviations that a length has to have
-FAR_APART = sigmas(CERTAIN)  # past which two logs are not of one arm
 MOST = 0.5
 """R² below which most of a torque is not the model's."""
 
@@ -76,7 +76,7 @@ def remarks(found: Fitted) -> Iterator[Notice]:
 def exchanged(fit: Fit) -> float | None:
     """By how many standard deviations the unloaded arm carries more, if by far."""
     for broken in broken_bounds(fit):
-        if broken.bound == "m_p >= 0" and (broken.distance or 0.0) > FAR_APART:
+        if broken.bound == "m_p >= 0" and (broken.distance or 0.0) > FAR:
             return broken.distance
     return None
 
@@ -241,21 +241,16 @@ def _of_length(found: Fitted) -> Iterator[Notice]:
     if "l1" in given and (by_constants := length_by_constants(fit)) is not None:
         measured.append(("l1", *by_constants))
     if given and fit.shared.payload:
-        shared = replace(fit.shared, lengths={})
-        value = dict(zip(fit.names, fit.values.tolist(), strict=True)) | given
-        start = np.array([value[name] for name in shared.names])
-        free = solved_anew(fit, shared, start, fit.prior, fit.shrinkage)
+        free = solved_anew(fit, replace(fit.shared, lengths={}), fit.prior, fit.shrinkage)
         by_name = zip(free.names, free.values.tolist(), free.std.tolist(), strict=True)
         measured += [one for one in by_name if one[0] in given]
     said = set[str]()
     for name, length, std in measured:
-        if name in said or not abs(length - given[name]) > FAR_APART * std:
-            continue
-        said.add(name)
-        distance = abs(length - given[name]) / std if std else np.inf
-        numbers = {"case": "identified", "name": name, "given": given[name], "estimate": length}
-        numbers |= {"half": fit.quantile * std, "distance": distance}
-        yield Notice("LENGTH_CONTRADICTED", numbers=numbers | {"p_value": chance(distance)})
+        numbers = contradicting(name, given[name], length, std, fit.quantile)
+        if numbers and name not in said:
+            said.add(name)
+            p_value = chance(numbers["distance"])
+            yield Notice("LENGTH_CONTRADICTED", numbers=numbers | {"p_value": p_value})
 
 
 def _of_arms(found: Fitted) -> Iterator[Notice]:
@@ -264,7 +259,7 @@ def _of_arms(found: Fitted) -> Iterator[Notice]:
     if far:
         yield Notice("LOGS_APART", numbers={"case": "exchanged", "p_value": chance(far)})
     apart = payload_distance(found.fit)
-    if apart is not None and apart > FAR_APART:
+    if apart is not None and apart > FAR:
         numbers = {"distance": apart, "p_value": chance(apart)}
         yield Notice("LOGS_APART", numbers={"case": "apart"} | numbers)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import isclose
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -252,9 +252,20 @@ def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice
         estimate, std = (None, None) if own is None else (own.estimate, own.std)
         if name == "l1" and by_constants is not None:
             estimate, std = by_constants
-        if estimate is None or not std or abs(given - estimate) <= FAR * std:
+        if estimate is None or not std:
             continue
-        numbers |= {"case": "identified", "distance": abs(given - estimate) / std}
-        numbers |= {"estimate": estimate, "half": result.quantile * std}
-        notices.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
+        if said := contradicting(name, given, estimate, std, result.quantile):
+            notices.append(Notice("LENGTH_CONTRADICTED", numbers=said))
     return tuple(notices)
+
+
+def contradicting(
+    name: str, given: float, estimate: float, std: float, quantile: float
+) -> dict[str, Any]:
+    """The numbers of a given length that contradicts an estimate; empty where it does not."""
+    off = abs(given - estimate)
+    if not off > FAR * std:
+        return {}
+    numbers: dict[str, Any] = {"case": "identified", "name": name, "given": given}
+    distance = off / std if std else np.inf
+    return numbers | {"estimate": estimate, "half": quantile * std, "distance": distance}

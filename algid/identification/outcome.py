@@ -20,7 +20,8 @@ from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
 from algid.estimators.prediction import PredictionScore, cross_validate
 from algid.estimators.terms import Selection
 from algid.identification.by_likelihood import Fitted
-from algid.identification.checks import FAR_APART, fit_notes, remarks
+from algid.identification.checks import fit_notes, remarks
+from algid.identification.known import FAR
 from algid.identification.recordings import Recordings
 from algid.identification.series import predictor_of_fit
 from algid.identification.validate import prediction, scores
@@ -357,7 +358,7 @@ def _pulled_down(fit: results.FitSummary | None, count: int) -> list[bool]:
         along, across = own.get(K4), own.get(f"{K4}s")
         turned = across.estimate or 0.0 if across is not None else 0.0
         pull, std = (along.estimate, along.std) if along is not None else (None, None)
-        down.append(bool(pull and std and pull > max(FAR_APART * std, abs(turned))))
+        down.append(bool(pull and std and pull > max(FAR * std, abs(turned))))
     return down
 
 

@@ -66,32 +66,5 @@ def _open_one(path: str | Path | FrameOrArrays, profile: Profile) -> TableReader
 
 
 def read_log(path: str | Path | FrameOrArrays, profile: Profile | None = None) -> Log:
-    """Read a whole log: see `open_log`.
-
-    Parameters
-    ----------
-    path : str, Path or columns
-        A file of any format that algid reads, or a rosbag2 folder; or a pandas or polars frame, or
-        a dict of arrays.
-    profile : Profile, optional
-        What the log's names, units and signs mean, where the log does not tell.
-
-    Returns
-    -------
-    Log
-        Its samples in SI units, and in `notices` what its user should know.
-
-    Raises
-    ------
-    LogError
-        As `open_log`, and if a value is not finite or time runs wrong.
-
-    Examples
-    --------
-    >>> import algid
-    >>> t = [0.0, 0.01, 0.02, 0.03]
-    >>> columns = {"t": t, "theta": [[0.0, 0.1, 0.2, 0.3], [0.0, 0.0, 0.1, 0.1]], "tau": [t, t]}
-    >>> algid.read_log(columns).theta[0].tolist()
-    [0.0, 0.1, 0.2, 0.3]
-    """
+    """Read a whole log into memory: see `algid.read_log`, and `open_log` for its errors."""
     return open_log(path, profile).whole()
