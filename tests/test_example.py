@@ -52,7 +52,5 @@ def test_with_its_profile_the_arm_is_found(example: Path) -> None:
     truth |= {"f1": FRICTION[0], "f2": FRICTION[1], "m_p": PAYLOAD, "l1": ARM.l1}
     for name, value in truth.items():
         found = result.estimates[name]
-        assert found.estimate is not None
-        assert found.std is not None
         assert abs(found.estimate - value) < 4 * found.std
         assert found.std < 4e-3 * value

@@ -191,7 +191,6 @@ def started(*words: str) -> subprocess.Popen[str]:
         env=environment(),
         start_new_session=True,
     )
-    assert running.stdout is not None
     assert running.stdout.readline() == "making\n"
     return running
 
@@ -234,7 +233,6 @@ def test_a_command_that_finishes_by_itself_ends_with_the_signals_code() -> None:
 
 def test_a_second_signal_kills_and_an_echo_of_the_first_does_not() -> None:
     running = started("deaf")
-    assert running.stdout is not None
     running.send_signal(signal.SIGINT)
     assert running.stdout.readline() == "heard\n"
     running.send_signal(signal.SIGINT)

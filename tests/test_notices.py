@@ -47,7 +47,6 @@ def flags_as_given(remedy: Remedy) -> dict[str, object]:
 @pytest.mark.parametrize("remedy", REMEDIES, ids=str)
 def test_flags_and_keywords_of_a_remedy_mean_the_same(remedy: Remedy) -> None:
     by_flags = profile_from(flags_as_given(remedy))
-    assert by_flags is not None
     if "angle_unit" not in remedy.settings:
         by_keywords = with_settings(Profile(), remedy.keywords)
         assert by_keywords.model_dump() == by_flags.model_dump()

@@ -52,14 +52,10 @@ def test_a_frame_is_a_log_to_every_verb(
     units: dict[str, Any] = {"angle_unit": "deg", "torque_unit": "mN m"}
     plain = algid.inspect(log).signals
     seen = algid.inspect(frame, **units)
-    assert seen.signals is not None
-    assert plain is not None
     assert seen.signals["tau1"].high == pytest.approx(plain["tau1"].high)
     assert [one.name for one in seen.entries] == ["t", "q[0]", "q[1]", "tau[0]", "tau[1]"]
     judged = algid.validate(weighed, frame, **units).total
     own = algid.validate(weighed, log).total
-    assert judged is not None
-    assert own is not None
     assert judged.rmse == pytest.approx(own.rmse, rel=1e-6)
     found = algid.track(frame, weighed, **units)
     assert found.track.stretches[0].m_p == pytest.approx(0.0, abs=5e-3)
@@ -85,8 +81,6 @@ def test_a_plot_is_the_pages_figure_of_every_interval(weighed: algid.Result) -> 
     known = weighed.parameters | weighed.payload
     assert set(bars.y) <= {n for n, one in known.items() if one.estimate is not None}
     low, high = weighed.parameters["k1"].ci95 or (0.0, 0.0)
-    assert low is not None
-    assert high is not None
     half = 50 * (high - low) / abs(weighed.parameters["k1"].estimate or 1.0)
     assert bars.error_x.array[bars.y.index("k1")] == pytest.approx(half)
 

@@ -109,8 +109,6 @@ def test_batches_killed_sixty_times_at_random_end_as_undisturbed_ones(
     with subprocess.Popen(
         command, env=env, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as server:
-        assert server.stdin is not None
-        assert server.stdout is not None
         instants, kills, outs, code, longest = random.Random(1), 0, 0, 1, None
         while kills < 60 or code:
             out = tmp_path / f"out{outs}"

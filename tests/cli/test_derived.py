@@ -361,5 +361,4 @@ def test_a_keyword_is_refused_as_its_flag_is(ask: Callable[[], object], named: s
 def test_dates_that_stamps_can_hold_are_taken(year: str) -> None:
     options: dict[str, Any] = {"duration": 0.1, "start_time": f"{year}-01-02"}
     stamps = algid.synthesise("case1", **options)[0].stamp_ns
-    assert stamps is not None
     assert datetime.fromtimestamp(stamps[0] / 1e9, UTC) == datetime(int(year), 1, 2, tzinfo=UTC)

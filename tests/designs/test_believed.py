@@ -70,7 +70,6 @@ def test_what_the_user_knows_beats_the_case() -> None:
 
 def test_a_results_covariance_is_believed_whole(tmp_path: Path) -> None:
     result = result_of(values_of(ODD), payload=PAYLOAD, std=0.01)
-    assert result.fit is not None
     C = np.array(result.fit.covariance)
     C[0, 3] = C[3, 0] = 0.8 * np.sqrt(C[0, 0] * C[3, 3])
     result = result.model_copy(

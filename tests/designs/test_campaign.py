@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ import polars as pl
 import pytest
 from click.testing import CliRunner
 
+from algid import __version__
 from algid.arm import inverse_dynamics
 from algid.base.errors import AlgidError
 from algid.designs.belief import objective_of
@@ -17,7 +20,9 @@ from algid.designs.campaign import Campaign, Design, plan
 from algid.designs.information import Experiment
 from algid.designs.prior import PriorKnowledge, prior_of
 from algid.designs.request import limits_of, request
+from algid.designs.write import Planned
 from algid.estimators.whitening import NoiseLevels
+from algid.notices import Notice
 from algid.readers import read_log
 from tests.cli.commands import app
 
@@ -89,6 +94,45 @@ def test_what_is_asked_for_is_what_becomes_certain(design: Design) -> None:
     place = design.names.index("m_p")
     assert payload.relative[place] < 0.9 * design.relative[place]
     assert payload.largest == payload.relative[place]
+
+
+def test_the_json_holds_what_decides_and_what_is_predicted(design: Design) -> None:
+    limits = replace(design.campaign.limits, acceleration=np.full(2, np.inf), height=-np.inf)
+    asked = replace(design.campaign.asked, known=np.arange(10) != 6)
+    changed = replace(design, campaign=replace(design.campaign, limits=limits, asked=asked))
+    doubts = (Notice("DOUBT", "something"),)
+    planned = Planned(changed, "arm.algid", "algid design arm.algid", ("a", "b"), doubts)
+    content = json.loads(planned.as_json())
+    decided = ("prior", "command", "drive", "duration", "rate", "seed", "interrupted", "gravity")
+    assert [content[name] for name in (*decided, "version", "joints", "runs")] == [
+        *("arm.algid", "algid design arm.algid", "position", 2.0, 500.0, 0, False, 9.81),
+        *(__version__, ["a", "b"], {"unloaded": 1, "loaded": 1}),
+    ]
+    assert content["noise"] == {"theta1": 1e-3, "theta2": 1e-3, "tau1": 1e-2, "tau2": 1e-2}
+    allowed = content["limits"]
+    np.testing.assert_allclose(allowed["range"], [[-np.pi / 2 - 1.2, -1.2], [1.2 - np.pi / 2, 1.2]])
+    assert (allowed["speed"], allowed["torque"]) == ([3.0, 3.0], [1.9, 0.95])
+    assert (allowed["acceleration"], allowed["tip_height"]) == ([None, None], None)
+    motion = {"range": design.motion.theta, "speed": design.motion.omega}
+    for limit, signal in motion.items():
+        rows = [row for row in content["used"] if row["limit"] == limit]
+        most = [sorted(row["most"] for row in rows if row["joint"] == joint) for joint in (1, 2)]
+        np.testing.assert_allclose(most, np.stack([signal.min(axis=1), signal.max(axis=1)], axis=1))
+    for row in rows:
+        assert row["share"] == pytest.approx(row["most"] / row["allowed"])
+    shares = [row["share"] for row in content["used"]]
+    assert shares == sorted(shares, reverse=True)
+    assert content["start"] == design.motion.theta[:, 0].tolist()
+    assert content["verdict"]["grade"] == "reservations"
+    assert "something" in [reason["text"] for reason in content["verdict"]["reasons"]]
+    k4, k7 = content["parameters"]["k4"], content["parameters"]["k7"]
+    believed = design.campaign.belief
+    assert (k4["believed"], k4["unit"], k4["asked"]) == (believed.mean[3], "N m", True)
+    assert (k4["believed_std"], k4["std"]) == (believed.std[3], design.std[3])
+    assert (k4["relative"], k4["worst_std"]) == (design.relative[3], design.worst[3])
+    assert k4["information_by_second"] == design.shares[3].round(4).tolist()
+    assert k7["relative"] is None  # what is zero has no relative error
+    assert content["largest_relative_bound"] == max(design.relative)
 
 
 def run(*arguments: str) -> tuple[int, str]:

@@ -1,6 +1,4 @@
-"""Fisher's information by hand: torques written out, derivatives by differences, covariances as
-whole matrices.
-"""
+"""Fisher's information by hand: derivatives by differences, covariances as whole matrices."""
 
 from __future__ import annotations
 
@@ -12,7 +10,7 @@ from algid.designs.information import Experiment, Information, Sensitivities
 from algid.designs.position import Fourier, middles
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
-from algid.model import Model, Motion
+from algid.model import Model, Motion, torque
 from algid.signals.differences import POINTS, Stencil
 
 RATE = 40.0
@@ -27,29 +25,9 @@ def motion(seed: int = 1) -> Motion:
     return FAMILY.motion(x, FAMILY.basis(middles(FAMILY.duration, RATE)))
 
 
-def torque_by_hand(
-    beta: FloatArray, q: FloatArray, v: FloatArray, a: FloatArray, loaded: bool
-) -> FloatArray:
-    """The torque of two links with Coulomb friction and a point mass at the tip, from Lagrange's
-    equations.
-    """
-    k1, k2, k3, k4, k5, k6, k7, f1, f2, m, l2 = beta
-    g, l1, m = 9.81, 0.4, m * loaded
-    inner, outer, mixed = k5 + m * l1**2, k3 + m * l2**2, k1 + m * l1 * l2
-    both = q[0] + q[1]
-    weight2 = (k2 + m * g * l2) * np.cos(both)
-    spin = v[0] + v[1]
-    # d/dt of the momenta of the angle in space (joint 2) and of joint 1, less the kinetic energy's
-    # slope
-    second = (
-        outer * (a[0] + a[1]) + mixed * (np.cos(q[1]) * a[0] + np.sin(q[1]) * v[0] ** 2) + weight2
-    )
-    turned = mixed * (np.cos(q[1]) * (a[0] + a[1]) - np.sin(q[1]) * spin**2)
-    first = inner * a[0] + turned + (k4 + m * g * l1) * np.cos(q[0])
-    friction = np.stack(
-        [k6 * v[0] + f1 * np.tanh(v[0] / 0.5), k7 * v[1] + f2 * np.tanh(v[1] / 0.5)]
-    )
-    return np.stack([first + second, second]) + friction
+def torque_of(beta: FloatArray, *moving: FloatArray, loaded: bool) -> FloatArray:
+    """What `tests/estimators/test_model.py` and `test_parametrisation.py` hold against SymPy."""
+    return torque(SHARED.model, SHARED.coefficients(beta, loaded), Motion(*moving))
 
 
 def slopes_by(function: object, beta: FloatArray, step: float = 1e-6) -> FloatArray:
@@ -71,7 +49,7 @@ def by_hand(noise: NoiseLevels, runs: tuple[int, int], one: Motion, rate: float)
     total = np.zeros((BETA.size, BETA.size))
     for loaded in (False, True):
         J = slopes_by(
-            lambda b, loaded=loaded: torque_by_hand(b, one.theta, one.omega, one.alpha, loaded),
+            lambda b, loaded=loaded: torque_of(b, one.theta, one.omega, one.alpha, loaded=loaded),
             BETA,
         )
         G = np.zeros((2 * n, 2 * (n + POINTS - 1)))
@@ -82,7 +60,7 @@ def by_hand(noise: NoiseLevels, runs: tuple[int, int], one: Motion, rate: float)
                 for step in (1e-6, -1e-6):
                     moved = [signal.copy() for signal in signals]
                     moved[order][joint] += step
-                    pair.append(torque_by_hand(BETA, moved[0], moved[1], moved[2], loaded))
+                    pair.append(torque_of(BETA, *moved, loaded=loaded))
                 slope = (pair[0] - pair[1]) / 2e-6
                 for sample in range(n):
                     for row in range(2):

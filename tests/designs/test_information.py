@@ -115,7 +115,6 @@ def test_usage_derivatives_are_those_of_differences() -> None:
         ).u
 
     found = usage(limits, Sensitivities(belief.shared.model, FAMILY.motion(x, basis), rate), loads)
-    assert found.by_motion is not None
     share = np.random.default_rng(0).uniform(size=found.u.shape)
     gradient = FAMILY.gradient(found.by_motion * share[:, None], basis)
     for place in (0, 1, 5, 20):

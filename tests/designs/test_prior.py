@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import algid
-from algid.base.errors import SettingError
 from algid.designs.belief import Belief, objective_of
 from algid.designs.prior import PriorKnowledge, prior_of
 from algid.results import Result, write_result
@@ -36,16 +35,6 @@ def test_a_length_far_from_the_results_is_a_warning(result: Result, tmp_path: Pa
     assert doubt.code == "LENGTH_CONTRADICTED"
     assert (doubt.numbers["name"], doubt.numbers["given"]) == ("l2", 0.2)
     assert prior_of(file, None, PriorKnowledge(l2=result.payload["l2"].estimate)).doubts == ()
-
-
-def test_an_impossible_arm_is_refused(result: Result, tmp_path: Path) -> None:
-    k1 = result.parameters["k1"].model_copy(update={"estimate": 0.1})
-    with pytest.raises(SettingError, match="not positive definite"):
-        prior_of(
-            saved(result, tmp_path, parameters={**result.parameters, "k1": k1}),
-            None,
-            PriorKnowledge(),
-        )
 
 
 def test_a_delay_that_was_estimated_is_planned_for_and_no_aim(tmp_path: Path) -> None:

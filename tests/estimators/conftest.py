@@ -4,12 +4,16 @@ estimators' tests.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
 
 from algid.arm import Arm, FloatArray, with_payload
+from algid.estimators.problem import Problem, Source
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
@@ -39,6 +43,15 @@ class Bench:
         theta = motion.theta + sigma * rng.standard_normal(motion.theta.shape)
         tau = motion.tau + 10 * sigma * rng.standard_normal(motion.tau.shape)
         return Segment(0.0, DT, theta, tau, motion.omega)
+
+
+def problem_of(*unloaded: Segment, loaded: Sequence[Segment] = (), **known: Any) -> Problem:
+    """Logs of a segment each, and what is known of them."""
+
+    def sources(logs: Sequence[Segment]) -> list[Source]:
+        return [partial(list, [log]) for log in logs]
+
+    return Problem(sources(unloaded), sources(loaded), **known)
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,6 @@
 """Physical bounds, worth of terms, payload of another arm, prediction."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -19,11 +18,11 @@ from algid.estimators.diagnostics import (
 )
 from algid.estimators.fit import finish
 from algid.estimators.parametrisation import Shared
-from algid.estimators.problem import Problem, Source, WeakSettings
+from algid.estimators.problem import WeakSettings
 from algid.model import Model
 from tests.intervals import holds_95
 
-from .conftest import DT, Bench
+from .conftest import DT, Bench, problem_of
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -76,32 +75,28 @@ def test_each_loaded_run_tells_its_payload_and_how_well_that_repeats(bench: Benc
     """
     masses = bench.payload + np.array([-0.005, 0.0, 0.005])
     z = bench.arm.payload_constants(1.0)
-    bare: list[Source] = [partial(list, [bench.log(sigma=1e-4, seed=seed)]) for seed in range(3)]
+    bare = [bench.log(sigma=1e-4, seed=seed) for seed in range(3)]
     added = np.zeros(7)
     added[[4, 2, 0, 3, 1]] = z  # k5, k3, k1, k4, k2
     motion = bench.burdened
     share = inverse_dynamics(
         added, motion.theta, motion.omega, np.gradient(motion.omega, DT, axis=1, edge_order=2)
     )
-    burdened: list[Source] = []
+    burdened = []
     for seed, mass in enumerate(masses):
         log = bench.log(loaded=True, sigma=1e-4, seed=seed)
-        burdened.append(partial(list, [replace(log, tau=log.tau + (mass - bench.payload) * share)]))
-    fit = weak.fit(Problem(bare, burdened, lengths={"l1": bench.arm.l1, "l2": bench.arm.l2}))
+        burdened.append(replace(log, tau=log.tau + (mass - bench.payload) * share))
+    lengths = {"l1": bench.arm.l1, "l2": bench.arm.l2}
+    fit = weak.fit(problem_of(*bare, loaded=burdened, lengths=lengths))
     found = repeatability(fit)
-    assert found is not None
     alone, std, (low, high) = found
     np.testing.assert_allclose(alone, masses, atol=6e-4)
     assert std == pytest.approx(0.005, rel=0.15)
     # χ² with two degrees of freedom: 0.0506 and 7.378
     assert low / std == pytest.approx(np.sqrt(2 / 7.378), rel=1e-3)
     assert high / std == pytest.approx(np.sqrt(2 / 0.05064), rel=1e-3)
-    assert (
-        repeatability(
-            weak.fit(Problem(bare, burdened[:1], lengths={"l1": bench.arm.l1, "l2": bench.arm.l2}))
-        )
-        is None
-    )
+    once = weak.fit(problem_of(*bare, loaded=burdened[:1], lengths=lengths))
+    assert repeatability(once) is None
 
 
 @pytest.mark.parametrize("rotor", [0.0, 0.02])
@@ -110,7 +105,7 @@ def test_a_mass_matrix_that_is_not_positive_definite_breaks_its_bound(
 ) -> None:
     """By the least eigenvalue of M(θ2), eq. (2), with the rotor in M22, over a turn."""
     settings = WeakSettings(Model(("rotor",) if rotor else ()))
-    fit = weak.fit(Problem([partial(list, [bench.log(sigma=1e-3)])], settings=settings))
+    fit = weak.fit(problem_of(bench.log(sigma=1e-3), settings=settings))
     rng = np.random.default_rng(0)
     seen = set()
     for _ in range(200):

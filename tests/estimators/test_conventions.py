@@ -25,6 +25,7 @@ from algid.estimators.conventions import AS_READ, Convention
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
 from pipelines.accuracy_scenes import random_arm
+from pipelines.conventions import INVISIBLE, NOTICED, SPOILS, Spoil
 from tests.estimators.conftest import DT, Bench
 
 Pair = tuple[FloatArray, FloatArray]
@@ -45,71 +46,35 @@ def measured(motion: SimulatedMotion, coulomb: float = 0.02, seed: int = 0) -> P
 
 
 def judged(theta: FloatArray, tau: FloatArray) -> Judgement:
-    found = judge(theta, tau, DT)
-    assert found is not None
-    return found
+    return judge(theta, tau, DT)
 
 
-FLIPPED = {
-    "all signs": "----",
-    "both torques": "++--",
-    "both angles": "--++",
-    "tau1": "++-+",
-    "tau2": "+++-",
-    "theta1": "-+++",
-    "theta2": "+-++",
-    "joint 1": "-+-+",
-    "joint 2": "+-+-",
+EVERY: dict[str, Spoil] = {
+    **SPOILS,
+    "θ1 off by 180°": lambda a, b, s, t: (a + np.pi, b, s, t),
+    "angles swapped": lambda a, b, s, t: (b, a, s, t),
+    "three at once": lambda a, b, s, t: (a + np.pi / 2, -(a + b), s, -t),
+    "degrees": lambda a, b, s, t: (np.degrees(a), np.degrees(b), s, t),
 }
-"""Signs of theta1, theta2, tau1, tau2."""
-TURNED = {
-    "hanging": (1, 0),
-    "upright": (-1, 0),
-    "theta1 by half a turn": (2, 0),
-    "theta2 by half a turn": (0, 2),
-    "theta2 by a quarter": (0, 1),
-}
-"""Quarter turns that the angles count more."""
 
 
 def spoiled(name: str, theta: FloatArray, tau: FloatArray) -> Pair:
-    if name in FLIPPED:
-        signs = np.array([[1.0 if sign == "+" else -1.0] for sign in FLIPPED[name]])
-        return signs[:2] * theta, signs[2:] * tau
-    if name in TURNED:
-        return theta + np.pi / 2 * np.array(TURNED[name])[:, None], tau
-    (a, b), (p, q) = theta, tau
-    pairs: dict[str, Pair] = {
-        "joints swapped": (theta[::-1], tau[::-1]),
-        "torques swapped": (theta, tau[::-1]),
-        "angles swapped": (theta[::-1], tau),
-        "absolute": (np.stack([a, a + b]), tau),
-        "motor at the base": (theta, np.stack([p - q, q])),
-        "three at once": (np.stack([a + np.pi / 2, -(a + b)]), np.stack([p, -q])),
-        "degrees": (np.degrees(theta), tau),
-        "motor side": (theta * np.array([[3.0], [1.0]]), tau),
-        "free gears": (theta * 9.6, tau),
-    }
-    return pairs[name]
+    a, b, s, t = EVERY[name](*theta, *tau)
+    return np.stack([a, b]), np.stack([s, t])
 
 
-OTHERS = """joints swapped, torques swapped, angles swapped, absolute, motor at the base, degrees,
-motor side, free gears, three at once"""
-
-
-@pytest.mark.parametrize("row", [*FLIPPED, *TURNED, *OTHERS.replace("\n", " ").split(", ")])
+@pytest.mark.parametrize("row", sorted(EVERY.keys() - {"nothing", *NOTICED, *INVISIBLE}))
 def test_the_convention_that_is_named_undoes_the_mistake(bench: Bench, row: str) -> None:
     theta, tau = measured(bench.bare)
-    found = judged(*spoiled(row, theta, tau))
+    wrong = spoiled(row, theta, tau)
+    found = judged(*wrong)
     assert found.alone
     assert found.best.convention != AS_READ
-    wrong = spoiled(row, theta, tau)
     mends = [found.best.convention, found.best.convention.mirrored()]
-    if row == "theta1 by half a turn":
+    if row == "θ1 off by 180°":
         mends.append(replace(AS_READ, signs=(-1, -1), torque_signs=(-1, -1), zero=(np.pi, 0.0)))
     # The log again, or the log from behind: cos θ1 and sin θ1 tell angles but for turns. Zeros are
-    # fitted to a
-    # thousandth, and a free scale to 1e-4 of angles of some ten rad.
+    # fitted to a thousandth, and a free scale to 1e-4 of angles of some ten rad.
     undone = [
         np.allclose(np.exp(1j * one.angles(wrong[0])), np.exp(1j * right), atol=0.01)
         and np.allclose(one.torques(wrong[1]), sense * tau, atol=1e-12)
@@ -185,7 +150,6 @@ def test_a_rest_that_friction_holds_accuses_no_zero(bench: Bench) -> None:
     still = theta[:, :1] + 3e-4 * noise[0]
     held = np.array([[0.5], [-0.3]]) + 1e-2 * noise[1]
     found = judge_together([Recorded(still, held, DT), Recorded(theta, tau, DT)])
-    assert found is not None
     assert found.alone
     assert found.best.convention == AS_READ
 
@@ -200,7 +164,6 @@ def test_logs_of_an_arm_are_judged_together(bench: Bench) -> None:
             Recorded(both[0][:, own], both[1][:, own], DT) for own in (np.s_[:half], np.s_[half:])
         ]
         found = judge_together(parts)
-        assert found is not None
         assert found.alone
         assert found.best.convention == mistake
 
@@ -234,7 +197,9 @@ def test_a_light_second_link_is_not_balanced() -> None:
 
 
 @pytest.mark.parametrize("passive", [1, 2])
-@pytest.mark.parametrize("mistake", ["none", "both torques", "theta2", "hanging", "absolute"])
+@pytest.mark.parametrize(
+    "mistake", ["nothing", "both torques", "θ2", "zero hanging", "θ2 absolute"]
+)
 def test_an_arm_with_one_motor_tells_its_convention(
     bench: Bench, passive: int, mistake: str
 ) -> None:
@@ -243,23 +208,20 @@ def test_an_arm_with_one_motor_tells_its_convention(
     motors = np.array([[float(passive != 1)], [float(passive != 2)]])
     motion = simulate(k, lambda times: wide(times) * motors, np.arange(4001) * DT)
     theta, tau = measured(motion, coulomb=0.0)
-    read = theta, tau * motors
-    if mistake != "none":
-        read = spoiled(mistake, *read)
+    read = spoiled(mistake, theta, tau * motors)
     found = judge_together([Recorded(*read, DT, passive)])
-    assert found is not None
     assert found.alone
-    assert (found.best.convention == AS_READ) == (mistake == "none")
+    assert (found.best.convention == AS_READ) == (mistake == "nothing")
     np.testing.assert_allclose(found.best.k[:5], k[:5], rtol=0.02, atol=0.02 * k[:5].max())
 
 
-@pytest.mark.parametrize("row", ["none", "tau1", "absolute", "three at once", "noise"])
+@pytest.mark.parametrize("row", ["nothing", "τ1", "θ2 absolute", "three at once", "noise"])
 def test_no_convention_that_is_passed_over_comes_nearer(bench: Bench, row: str) -> None:
     """Every convention with its zeros by quarter turns, against those that bounds leave."""
     theta, tau = measured(bench.bare)
     if row == "noise":
         tau = np.random.default_rng(2).standard_normal(tau.shape)
-    elif row != "none":
+    else:
         theta, tau = spoiled(row, theta, tau)
     trials = Trials([Recorded(theta, tau, DT)], True)
     looked_at = trials.unscaled()

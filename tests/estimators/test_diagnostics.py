@@ -5,7 +5,6 @@ told.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -24,11 +23,10 @@ from algid.estimators.diagnostics import (
 )
 from algid.estimators.fit import Fit, alone, finish
 from algid.estimators.parametrisation import Shared
-from algid.estimators.problem import Problem
 from algid.model import Model
 from algid.notices import Notice
 
-from .conftest import Bench
+from .conftest import Bench, problem_of
 
 PLAIN = Model()
 K = np.array([0.03, 1.4, 0.05, 1.9, 0.06, 0.1, 0.2])
@@ -90,7 +88,6 @@ def test_the_length_by_constants_has_the_error_of_a_ratio() -> None:
     """Against draws of k1 and k2 by their covariance; a few thousand tell a deviation to 5 %."""
     fit = fit_of(K)
     found = length_by_constants(fit)
-    assert found is not None
     assert found[0] == pytest.approx(9.81 * 0.03 / 1.4)
     drawn = np.random.default_rng(0).multivariate_normal(
         fit.values[:2], fit.covariance[:2, :2], 5000
@@ -133,24 +130,19 @@ def test_logs_of_one_arm_are_not_taken_for_those_of_two(bench: Bench) -> None:
     found = []
     for seed in range(12):
         logs = [bench.log(loaded, 1e-3, 20 + seed) for loaded in (False, True)]
-        found.append(
-            payload_distance(
-                weak.fit(Problem([partial(list, logs[:1])], [partial(list, logs[1:])]))
-            )
-        )
+        found.append(payload_distance(weak.fit(problem_of(logs[0], loaded=logs[1:]))))
     apart = [distance for distance in found if distance is not None]
     assert len(apart) == 12
     assert max(apart) < 5
     other = replace(logs[1], tau=logs[1].tau + 0.5 * bench.arm.b2 * bench.burdened.omega)
-    told = payload_distance(weak.fit(Problem([partial(list, logs[:1])], [partial(list, [other])])))
-    assert told is not None
+    told = payload_distance(weak.fit(problem_of(logs[0], loaded=[other])))
     assert told > 5
 
 
 def test_the_distance_of_two_arms_is_that_of_what_no_payload_explains(bench: Bench) -> None:
     """χ² of the loaded constants less the arm's and the payload's of another solver."""
     logs = [bench.log(loaded, 1e-3, 27) for loaded in (False, True)]
-    fit = weak.fit(Problem([partial(list, logs[:1])], [partial(list, logs[1:])]))
+    fit = weak.fit(problem_of(logs[0], loaded=logs[1:]))
     bare, burdened = (alone(fit.shared, [log]) for log in fit.logs)
     whitening = np.linalg.inv(np.linalg.cholesky(bare.covariance + burdened.covariance))
 

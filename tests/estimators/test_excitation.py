@@ -5,7 +5,6 @@ other.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -14,14 +13,14 @@ from algid.arm import with_payload
 from algid.estimators import robust, weak
 from algid.estimators.diagnostics import ratio_of_joints
 from algid.estimators.excitation import UNLIKE, UNLIKE_IN_MANY, contradicted
-from algid.estimators.problem import Problem, Source, WeakSettings
+from algid.estimators.problem import WeakSettings
 from algid.model import RIGID, Model
 from algid.notices import Notice
 from algid.signals.segments import Segment
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 
-from .conftest import DT, Bench
+from .conftest import DT, Bench, problem_of
 
 REFUTED = Notice("REFUTED", numbers={"case": "noise", "kept": "weak"})
 
@@ -33,11 +32,9 @@ def test_a_joint_that_is_hardly_driven_is_told_by_the_other(bench: Bench, idle: 
     share[idle] = 0.02
     log = bench.log(sigma=1e-4)
     normal = weak.normal_equations(lambda: [replace(log, tau=log.tau * share)], WeakSettings())
-    assert normal is not None
     ratio = ratio_of_joints([normal], Model(), UNLIKE)
     assert ratio == pytest.approx(share[1, 0] / share[0, 0], rel=0.03)
     sound = weak.normal_equations(lambda: [log], WeakSettings())
-    assert sound is not None
     assert ratio_of_joints([sound], Model(), UNLIKE_IN_MANY) is None
 
 
@@ -58,8 +55,8 @@ def test_torques_that_contradict_each_other_are_told_by_any_number_of_logs(
     """From four runs on, what the model lacks has shown itself: a smaller contradiction counts."""
     scale = np.array([[1.0], [factor]])
     logs = [replace(log, tau=log.tau * scale) for log in _runs(bench, count)]
-    sources: list[Source] = [partial(list, [log]) for log in logs]
-    found = contradicted(weak.fit(Problem(sources)), Problem(sources))
+    known = problem_of(*logs)
+    found = contradicted(weak.fit(known), known)
     assert (found is not None) is told
     assert found is None or found.code == "JOINTS_CONTRADICT"
 
@@ -77,8 +74,8 @@ def test_a_light_second_link_is_driven(bench: Bench) -> None:
     assert size[1] < 0.02 * size[0]
     tau = motion.tau + 0.01 * size * rng.standard_normal(motion.tau.shape)
     log = Segment(0.0, DT, motion.theta + 1e-4 * rng.standard_normal(tau.shape), tau)
-    fit = replace(weak.fit(Problem([lambda: [log]])), notes=(REFUTED,))
-    assert contradicted(fit, Problem([lambda: [log]])) is None
+    fit = replace(weak.fit(problem_of(log)), notes=(REFUTED,))
+    assert contradicted(fit, problem_of(log)) is None
 
 
 def test_a_loaded_log_is_held_against_itself(bench: Bench) -> None:
@@ -86,22 +83,21 @@ def test_a_loaded_log_is_held_against_itself(bench: Bench) -> None:
     contradiction.
     """
     bare, burdened = bench.log(sigma=1e-4), bench.log(True, 1e-4)
-    sources = [lambda: [bare]], [lambda: [burdened]]
-    assert contradicted(weak.fit(Problem(*sources)), Problem(*sources)) is None
+    right = problem_of(bare, loaded=[burdened])
+    assert contradicted(weak.fit(right), right) is None
     idle = replace(burdened, tau=burdened.tau * np.array([[0.02], [1.0]]))
-    wrong = [lambda: [bare]], [lambda: [idle]]
-    assert contradicted(weak.fit(Problem(*wrong)), Problem(*wrong)) is not None
+    wrong = problem_of(bare, loaded=[idle])
+    assert contradicted(weak.fit(wrong), wrong) is not None
 
 
 def test_a_refuted_log_in_which_a_joint_stood_still_is_not_ok(bench: Bench) -> None:
     log = bench.log(sigma=1e-4)
     tremble = 1e-3 * np.sin(40 * log.t)  # backlash, say: told well enough to be determined
     still = replace(log, theta=np.stack([log.theta[0], 0.3 + tremble]))
-    fit = weak.fit(Problem([lambda: [still]]))
-    found = contradicted(fit, Problem([lambda: [still]]))
-    assert found is not None
+    fit = weak.fit(problem_of(still))
+    found = contradicted(fit, problem_of(still))
     assert found.text == "joint 2 never moved: give a log in which both joints do"
-    assert contradicted(weak.fit(Problem([lambda: [log]])), Problem([lambda: [log]])) is None
+    assert contradicted(weak.fit(problem_of(log)), problem_of(log)) is None
 
 
 def test_an_arm_that_a_payload_outweighs_is_not_thrown_away(bench: Bench) -> None:
@@ -113,7 +109,7 @@ def test_an_arm_that_a_payload_outweighs_is_not_thrown_away(bench: Bench) -> Non
     motion = simulate(heavy, wide, np.arange(4001) * DT)
     bare, burdened = bench.log(sigma=1e-4), Segment(0.0, DT, motion.theta, motion.tau)
     assert np.all(np.std(burdened.tau, axis=1) > 5 * np.std(bare.tau, axis=1))
-    fit = robust.fit(Problem([lambda: [bare]], [lambda: [burdened]]))
+    fit = robust.fit(problem_of(bare, loaded=[burdened]))
     assert set(fit.status) == {"OK"}
     for name, true in zip(RIGID, bench.truth, strict=False):
         assert fit.values[fit.names.index(name)] == pytest.approx(true, rel=0.02), name

@@ -13,11 +13,12 @@ import numpy as np
 
 from algid.estimators import refined
 from algid.estimators.fit import Fit
-from algid.estimators.problem import Problem, WeakSettings
+from algid.estimators.problem import WeakSettings
 from algid.signals.segments import Segment
 from algid.signals.shift import TorqueShift
 from algid.synth.cases import load_case
 from pipelines.simulator import Controller, Plan, controlled
+from tests.estimators.conftest import problem_of
 
 RATE, SECONDS, NOISE = 1000.0, 8.0, 2e-3
 
@@ -44,7 +45,7 @@ def follower() -> Segment:
 
 
 def fitted(log: Segment) -> Fit:
-    return refined.fit(Problem([lambda: [log]], (), WeakSettings(shift=TorqueShift(held=True))))
+    return refined.fit(problem_of(log, settings=WeakSettings(shift=TorqueShift(held=True))))
 
 
 def test_noise_that_is_fed_back_is_no_delay() -> None:
@@ -59,6 +60,5 @@ def test_a_delay_is_seen_behind_noise_that_is_fed_back() -> None:
     log = follower()
     late = replace(log, theta=log.theta[:, :-2], tau=log.tau[:, 2:])
     misfit = fitted(late).misfit
-    assert misfit is not None
     evident = {one.term: one.p_value for one in misfit.overlooked}
     assert evident["delay"] < 1e-6

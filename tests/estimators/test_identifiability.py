@@ -15,10 +15,9 @@ from algid.estimators.combine import LogInformation
 from algid.estimators.fit import alone, finish
 from algid.estimators.identifiability import examine, open_directions
 from algid.estimators.parametrisation import Shared
-from algid.estimators.problem import Problem
 from algid.model import Model
 
-from .conftest import Bench
+from .conftest import Bench, problem_of
 
 MOVED = np.ones(2)
 NAMES = ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
@@ -123,7 +122,7 @@ def test_a_sum_is_known_whose_terms_are_not(bench: Bench) -> None:
         np.isinf(own.std), [False, False, True, False, True, False, False]
     )
     np.testing.assert_allclose(own.values[[0, 1, 3, 5, 6]], fit.values[[0, 1, 3, 5, 6]], rtol=1e-6)
-    whole = weak.fit(Problem([lambda: [bench.log(sigma=1e-3)]]))
+    whole = weak.fit(problem_of(bench.log(sigma=1e-3)))
     lost = replace(whole, status=("NOT_IDENTIFIABLE", *whole.status[1:]))
     assert np.isinf(lost.std[0])
     assert np.isinf(lost.ci95[0]).all()

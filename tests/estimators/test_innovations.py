@@ -29,7 +29,6 @@ def test_the_bands_hold_95_percent_of_white_noise_and_tell_it_from_90() -> None:
     for _ in range(40):
         pieces = [residual_sums(rng.normal(size=(2, n)), DT) for n in (4000, 2500, 700)]
         sums = pooled(pieces)
-        assert sums is not None
         r, S = autocorrelation(sums), whiteness_of(sums)
         lags, lags_in = lags + r.correlation.size, lags_in + _inside(r.correlation, -r.half, r.half)
         bins, bins_in = bins + S.density.size, bins_in + _inside(S.density, S.low, S.high)

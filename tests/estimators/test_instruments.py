@@ -5,7 +5,6 @@ does.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -14,21 +13,19 @@ from algid.estimators import instruments, refined, weak
 from algid.estimators.combine import Prior
 from algid.estimators.modulating_functions import Windows
 from algid.estimators.parametrisation import Shared
-from algid.estimators.problem import Problem, Source
 from algid.model import Model
 from algid.signals.segments import Segment
 from pipelines.disturbed import DT, scene
 
-from .conftest import Bench
+from .conftest import Bench, problem_of
 
 
 @pytest.mark.slow
 def test_instruments_undo_most_of_what_a_disturbance_does() -> None:
     made = scene(1, feedback=False)
     logs = [Segment(0.0, DT, *log) for log in zip(made.theta, made.tau, strict=True)]
-    sources: list[Source] = [partial(list, [log]) for log in logs]
-    least = weak.fit(Problem(sources))
-    found = instruments.fit(Problem(sources), start=least)
+    least = weak.fit(problem_of(*logs))
+    found = instruments.fit(problem_of(*logs), start=least)
     assert found.estimator == "instruments"
     truth = made.arm.constants()
     inertias = [0, 2, 4]
@@ -39,12 +36,9 @@ def test_instruments_undo_most_of_what_a_disturbance_does() -> None:
 
 def test_a_payload_of_nothing_has_its_error_bar_where_lengths_are_known(bench: Bench) -> None:
     lengths = {"l1": bench.arm.l1, "l2": bench.arm.l2}
-    unloaded: list[Source] = [partial(list, [bench.log(sigma=1e-3, seed=1)])]
-    loaded: list[Source] = [partial(list, [bench.log(sigma=1e-3, seed=2)])]
-    for fit in (
-        weak.fit(Problem(unloaded, loaded, lengths=lengths)),
-        refined.fit(Problem(unloaded, loaded, lengths=lengths)),
-    ):
+    first, second = (bench.log(sigma=1e-3, seed=seed) for seed in (1, 2))
+    known = problem_of(first, loaded=[second], lengths=lengths)
+    for fit in (weak.fit(known), refined.fit(known)):
         place = fit.names.index("m_p")
         assert fit.status[place] == "OK"
         assert abs(fit.values[place]) < 4 * fit.std[place]
@@ -95,10 +89,10 @@ def test_coefficients_that_move_no_arm_and_windows_that_run_away_are_told(bench:
     _, good, moves = instruments.simulated(Model(), wild, every, start, tau, measured)
     assert not good.any()
     assert moves.all()
-    least = weak.fit(Problem([lambda: [log]]))
+    least = weak.fit(problem_of(log))
     for astray_at in (-k, wild):
-        assert instruments.evidence(Problem([lambda: [log]]), Shared(Model()), astray_at) is None
-    astray = instruments.fit(Problem([lambda: [log]]), start=replace(least, values=-least.values))
+        assert instruments.evidence(problem_of(log), Shared(Model()), astray_at) is None
+    astray = instruments.fit(problem_of(log), start=replace(least, values=-least.values))
     assert (astray.converged, set(astray.status), astray.estimator) == (
         False,
         {"NOT_CONVERGED"},
@@ -108,8 +102,8 @@ def test_coefficients_that_move_no_arm_and_windows_that_run_away_are_told(bench:
 
 def test_what_start_and_prior_know_stays_known(bench: Bench) -> None:
     log = bench.log(sigma=1e-3)
-    least = weak.fit(Problem([lambda: [log]]))
-    found = instruments.fit(Problem([lambda: [log]]), start=least)
+    least = weak.fit(problem_of(log))
+    found = instruments.fit(problem_of(log), start=least)
     np.testing.assert_array_equal(found.moved, least.moved)
     k4 = float(least.values[3])
     sure = Prior(
@@ -117,7 +111,7 @@ def test_what_start_and_prior_know_stays_known(bench: Bench) -> None:
         np.array([*least.values[:3], 1.01 * k4]),
         np.diag([0, 0, 0, 1e10 / k4**2]),
     )
-    told = instruments.fit(Problem([lambda: [log]], prior=sure))
+    told = instruments.fit(problem_of(log, prior=sure))
     assert told.prior is sure
     assert told.values[3] == pytest.approx(1.01 * k4, rel=1e-3)
     assert told.std[3] < 2e-5 * k4

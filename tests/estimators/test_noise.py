@@ -18,10 +18,11 @@ from algid.estimators.noise import (
 )
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise
 from algid.model import Model
-from algid.signals.differences import POINTS, Stencil
+from algid.signals.differences import Stencil
 from algid.signals.segments import Segment
 
 from .conftest import DT, Bench
+from .test_whitening import dense, lower, moving_sum
 
 ANGLES = 60
 LEVELS = NoiseLevels(np.array([1.2e-3, 0.8e-3]), np.array([0.9e-2, 1.3e-2]))
@@ -65,22 +66,11 @@ def _parts(linear: Linearised) -> tuple[list[FloatArray], FloatArray]:
     """V_i, the four components of the covariance of e / σ_τ, and Y with e as the last column,
     dense and unwhitened.
     """
-    n = linear.H.shape[-1]
-    H = np.zeros((n, 2, ANGLES, 2))
-    for row in range(n):
-        for point in range(POINTS):
-            H[row, :, linear.first + row + point] += linear.H[:, :, point, row]
-    size = linear.taps.size
-    weights = np.zeros((n, n + size - 1))
-    for row in range(n):
-        weights[row, row : row + size] = linear.taps
-    columns = [H[:, :, :, joint].reshape(2 * n, ANGLES) for joint in range(2)]
-    parts: list[FloatArray] = [column @ column.T for column in columns]
+    H = dense(linear.H, linear.first, ANGLES)
+    weights = moving_sum(linear.taps, linear.H.shape[-1])
+    parts: list[FloatArray] = [H[:, joint::2] @ H[:, joint::2].T for joint in range(2)]
     parts += [np.kron(weights @ weights.T, np.diag(np.eye(2)[joint])) for joint in range(2)]
-    L = np.asarray(
-        sum(np.diag(linear.factor[-1 - below, below:], -below) for below in range(2 * POINTS))
-    )
-    return parts, L @ linear.columns.T
+    return parts, lower(linear.factor) @ linear.columns.T
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["foh", "zoh"])

@@ -9,10 +9,11 @@ import pytest
 from scipy.signal import lfilter
 
 from algid.arm import FloatArray
-from algid.estimators.problem import Problem, Source, WeakSettings
-from algid.estimators.references import followed
+from algid.estimators.problem import WeakSettings
+from algid.estimators.references import Following, followed
 from algid.log import Log, Origin, join
 from algid.signals.segments import Segment, segments
+from tests.estimators.conftest import problem_of
 
 DT = 0.004
 SETTINGS = WeakSettings()
@@ -32,11 +33,8 @@ def log(seed: int, *, disturbance: float = 0.3) -> tuple[Segment, FloatArray]:
     return Segment(0.0, DT, theta, theta - clean, reference=reference), clean
 
 
-def sources_of(*logs: Segment) -> list[Source]:
-    def source(one: Segment) -> Source:
-        return lambda: [one]
-
-    return [source(one) for one in logs]
+def asked(*logs: Segment) -> Following:
+    return followed(problem_of(*logs, settings=SETTINGS))
 
 
 def test_the_motion_that_the_reference_makes_is_found_without_the_disturbance() -> None:
@@ -44,11 +42,9 @@ def test_the_motion_that_the_reference_makes_is_found_without_the_disturbance() 
     coefficients in the independent samples, some 30 in 6 × 16 s / 0.2 s.
     """
     made = [log(seed) for seed in range(6)]
-    found = followed(Problem(sources_of(*(one for one, _ in made)), settings=SETTINGS))
-    assert found is not None
+    found = asked(*(one for one, _ in made))
     piece, clean = made[0]
     motion = found.motion(piece)
-    assert motion is not None
     settled = slice(250, None)  # the longest lag: what was before the log nobody knows
     off = np.std(motion.theta[:, settled] - clean[:, settled], axis=1)
     disturbance = np.std(piece.theta[:, settled] - clean[:, settled], axis=1)
@@ -58,20 +54,17 @@ def test_the_motion_that_the_reference_makes_is_found_without_the_disturbance() 
 
 def test_what_the_arm_does_not_follow_is_no_instrument() -> None:
     piece, _ = log(0)
-    assert followed(Problem(sources_of(piece), settings=SETTINGS)) is not None
+    assert asked(piece) is not None
     other = np.sin(2 * np.pi * 2.9 * piece.t + np.array([[0.0], [1.0]]))
-    assert followed(Problem(sources_of(replace(piece, reference=other)), settings=SETTINGS)) is None
+    assert asked(replace(piece, reference=other)) is None
     held = replace(piece, reference=np.zeros_like(piece.theta))
-    assert followed(Problem(sources_of(held), settings=SETTINGS)) is None
+    assert asked(held) is None
 
 
 def test_logs_without_a_reference_have_no_such_instrument() -> None:
     piece, _ = log(0)
-    assert (
-        followed(Problem(sources_of(piece, replace(piece, reference=None)), settings=SETTINGS))
-        is None
-    )
-    assert followed(Problem([], settings=SETTINGS)) is None
+    assert asked(piece, replace(piece, reference=None)) is None
+    assert asked() is None
 
 
 def test_a_reference_goes_where_its_samples_go() -> None:
@@ -82,10 +75,8 @@ def test_a_reference_goes_where_its_samples_go() -> None:
     whole = Log(stamps, line, line, Origin("", "", {}), reference=line + 1)
     blocks = [whole.part(first, first + 700) for first in range(0, 5000, 700)]
     again = join(blocks)
-    assert again.reference is not None
     assert np.array_equal(again.reference, line + 1)
     for segment in segments(blocks):
-        assert segment.reference is not None
         assert segment.reference == pytest.approx(segment.theta + 1)
     none = replace(blocks[1], reference=None)
     assert join([blocks[0], none]).reference is None

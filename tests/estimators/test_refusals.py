@@ -4,25 +4,23 @@ callback's tale.
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
 
 from algid.estimators import refined, weak
-from algid.estimators.problem import Problem, Source
+from algid.estimators.problem import Problem
 from algid.signals.segments import Segment
 
-from .conftest import DT, Bench
+from .conftest import DT, Bench, problem_of
 
 
 def test_steps_that_do_not_settle_leave_the_weak_estimate(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    source: Source = partial(list, [bench.log(sigma=1e-3)])
+    known = problem_of(bench.log(sigma=1e-3))
     monkeypatch.setattr(refined, "_STEPS", 1)
-    fit = refined.fit(Problem([source]))
-    before = weak.fit(Problem([source]))
+    fit = refined.fit(known)
+    before = weak.fit(known)
     assert (fit.estimator, fit.refuted, fit.iterations) == ("weak", True, 1)
     assert fit.status == before.status == ("OK",) * 7
     assert [note.code for note in fit.notes] == ["REFUTED"]
@@ -39,7 +37,7 @@ def test_a_factor_that_does_not_exist_leaves_the_weak_estimate(
     log = bench.log(sigma=1e-3)
     still = Segment(0.0, DT, np.stack([log.theta[0], np.full(len(log), 0.2)]), log.tau)
     monkeypatch.setattr(refined, "_train", fails)
-    fit = refined.fit(Problem([lambda: [still]]))
+    fit = refined.fit(problem_of(still))
     assert (fit.estimator, fit.refuted, fit.iterations) == ("weak", True, 0)
     assert set(fit.status) == {"OK", "NOT_IDENTIFIABLE"}
 
@@ -49,12 +47,12 @@ def test_stretches_too_short_to_tell_are_left_out_and_each_step_is_told(bench: B
     crumb = Segment(3.0, DT, log.theta[:, :30], log.tau[:, :30])
     told: list[tuple[str, int, int]] = []
     fit = refined.fit(Problem([lambda: [log, crumb]], progress=lambda *what: told.append(what)))
-    np.testing.assert_array_equal(fit.values, refined.fit(Problem([lambda: [log]])).values)
+    np.testing.assert_array_equal(fit.values, refined.fit(problem_of(log)).values)
     assert [stage for stage, _, _ in told] == [
         f"fitting, step {step}" for step in range(1, fit.iterations + 1)
     ]
     assert {(done, total) for _, done, total in told} == {(2000, 2000)}
-    crumbs = refined.fit(Problem([lambda: [log], lambda: [crumb]]))
+    crumbs = refined.fit(problem_of(log, crumb))
     np.testing.assert_array_equal(crumbs.values, fit.values)
     assert len(crumbs.logs) == 1
 
@@ -67,7 +65,6 @@ def test_a_short_log_does_not_hide_its_torques_noise_in_its_angles(bench: Bench)
     levels = []
     for seed in range(4):
         log = bench.log(sigma=1e-3, seed=seed).part(100 * seed, 100 * seed + 300)
-        fit = refined.fit(Problem([partial(list, [log])]))
-        assert fit.noise is not None
+        fit = refined.fit(problem_of(log))
         levels.append(fit.noise[0].tau)
     assert np.min(levels) > 0.7e-2

@@ -7,12 +7,13 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.estimators import robust
-from algid.estimators.problem import Problem, Source, WeakSettings
+from algid.estimators.problem import WeakSettings
 from algid.estimators.repeats import grouped
 from algid.signals.segments import Segment
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 from pipelines.accuracy_scenes import random_arm
+from tests.estimators.conftest import problem_of
 
 
 def run(seed: int, shift: float = 0.0, dt: float = 2e-3, seconds: float = 6.0) -> Segment:
@@ -25,27 +26,23 @@ def run(seed: int, shift: float = 0.0, dt: float = 2e-3, seconds: float = 6.0) -
     return Segment(0.0, dt, theta + 1e-3 * noise, np.zeros_like(theta))
 
 
-def source(log: Segment) -> Source:
-    return lambda: [log]
-
-
 def test_repeats_are_found_by_their_motion() -> None:
     """At another rate, begun later, a little shorter.
 
     Another motion and a loaded log are no repeats.
     """
     logs = [run(1), run(2), run(1, shift=0.3), run(1, dt=4e-3), run(1, seconds=5.5), run(3)]
-    unloaded = [source(log) for log in logs]
-    assert grouped(unloaded, [source(run(1))]) == ((0, 2, 3, 4), (1,), (5,), (6,))
+    known = problem_of(*logs, loaded=[run(1)])
+    assert grouped(known.unloaded, known.loaded) == ((0, 2, 3, 4), (1,), (5,), (6,))
 
 
 def test_a_repeat_may_be_recorded_some_seconds_later() -> None:
     logs = [run(1, seconds=24.0), run(1, seconds=24.0, shift=4.0), run(2, seconds=24.0)]
-    assert grouped([source(log) for log in logs], []) == ((0, 1), (2,))
+    assert grouped(problem_of(*logs).unloaded, []) == ((0, 1), (2,))
 
 
 def fitted(logs: list[Segment]) -> tuple[FloatArray, FloatArray]:
-    found = robust.fit(Problem([source(log) for log in logs], (), WeakSettings(bandwidth=60.0)))
+    found = robust.fit(problem_of(*logs, settings=WeakSettings(bandwidth=60.0)))
     return found.values[:7], found.std[:7]
 
 

@@ -5,7 +5,6 @@ endogenous torque and of feedback, each with the estimate or the warning that it
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +24,7 @@ from pipelines.disturbed import DT, Scene, scene
 from pipelines.race_peers import even
 from pipelines.run_to_run import runs as runs_of
 
-from .conftest import Bench
+from .conftest import Bench, problem_of
 
 SETTINGS = WeakSettings(bandwidth=60.0)
 SHARED = Shared(Model(("offset",)))
@@ -96,11 +95,9 @@ def _rubbing(bench: Bench, part: slice) -> Segment:
 
 def test_least_squares_with_the_same_prior_gives_the_same(bench: Bench) -> None:
     logs = [_rubbing(bench, slice(start, start + 1300)) for start in (0, 1300, 2600)]
-    sources: list[Source] = [partial(list, [log]) for log in logs]
-    settings = WeakSettings(bandwidth=60.0)
-    found = least_squares(sources, settings)
-    assert found.shrinkage is not None
-    still = AT_REST * weak.speeds(sources, settings)
+    sources = problem_of(*logs).unloaded
+    found = least_squares(sources, SETTINGS)
+    still = AT_REST * weak.speeds(sources, SETTINGS)
     same = WeakSettings(
         found.shared.model, bandwidth=60.0, estimate_delay=True, rest=(still[0], still[1])
     )
@@ -137,24 +134,20 @@ def test_the_variance_of_a_cross_correlation_is_that_of_independent_series() -> 
     assert 0.8 < spread < 1.2  # 400 values of ± 4 %, and variances from 400 samples
 
 
-def sources_of(made: Scene, *, reference: bool = False) -> list[Source]:
+def problem(made: Scene, *, reference: bool = False) -> Problem:
     asked = made.reference if reference and made.reference is not None else [None] * len(made.tau)
     logs = [
         Segment(0.0, DT, theta, tau, reference=one)
         for theta, tau, one in zip(made.theta, made.tau, asked, strict=True)
     ]
-
-    def source(log: Segment) -> Source:
-        return lambda: [log]
-
-    return [source(log) for log in logs[:4]]
+    return problem_of(*logs[:4], settings=SETTINGS)
 
 
 def settled(made: Scene, *, reference: bool = False) -> tuple[Fit, Fit]:
     """By least squares, and what stands in the end."""
-    problem = RobustProblem.of(Problem(sources_of(made, reference=reference), (), SETTINGS))
-    least = problem.least_squares()
-    return least, problem.instruments_if_endogenous(least)
+    robustly = RobustProblem.of(problem(made, reference=reference))
+    least = robustly.least_squares()
+    return least, robustly.instruments_if_endogenous(least)
 
 
 def off(fit: Fit, made: Scene) -> FloatArray:
@@ -181,10 +174,8 @@ def test_feedback_is_said_and_leaves_least_squares() -> None:
     least, found = settled(made)
     assert found.values == pytest.approx(least.values)
     assert [note.code for note in found.notes] == ["FEEDBACK"]
-    problem = RobustProblem.of(Problem(sources_of(made), (), SETTINGS))
-    by_instruments = problem.by_instruments(least, least.values)
-    assert by_instruments is not None
-    watched = robust.with_feedback_noted(by_instruments, problem.problem)
+    by_instruments = RobustProblem.of(problem(made)).by_instruments(least, least.values)
+    watched = robust.with_feedback_noted(by_instruments, problem(made))
     assert [note.code for note in watched.notes] == ["FEEDBACK"]
 
 
@@ -197,10 +188,10 @@ def test_a_reference_is_the_instrument_under_feedback() -> None:
     assert [note.code for note in found.notes] == ["INSTRUMENTS"]
     assert off(found, made).max() < 1
     assert off(found, made)[0] < 0.5 * off(least, made)[0]  # k1 is attenuated most
-    problem = Problem(sources_of(made, reference=True), settings=SETTINGS)
-    assert robust.with_feedback_noted(found, problem).notes == found.notes
-    asked = instruments.fit(problem)
-    by_torque = instruments.fit(Problem(sources_of(made), settings=SETTINGS))
+    known = problem(made, reference=True)
+    assert robust.with_feedback_noted(found, known).notes == found.notes
+    asked = instruments.fit(known)
+    by_torque = instruments.fit(problem(made))
     truth = made.arm.constants()[:5]
     error, worse = (np.abs(fit.values[:5] / truth - 1).mean() for fit in (asked, by_torque))
     assert error < 0.5 * worse
@@ -219,10 +210,9 @@ def test_an_arm_without_unmodelled_torque_keeps_least_squares() -> None:
 def test_a_single_run_of_a_real_arm_agrees_with_the_others(shared_data: Path) -> None:
     """Run 7 of design A.0 was 3.9 standard deviations of the difference off."""
     runs = [even(log) for log in runs_of(shared_data, "A.0")]
-    alone = RobustProblem.of(Problem([partial(list, [runs[6]])], (), WeakSettings()))
+    alone = RobustProblem.of(problem_of(runs[6]))
     least = alone.least_squares()
-    others: list[Source] = [partial(list, [run]) for place, run in enumerate(runs) if place != 6]
-    rest = least_squares(others, WeakSettings())
+    rest = least_squares(problem_of(*runs[:6], *runs[7:]).unloaded, WeakSettings())
     found = alone.with_scatter(least, least, [{"window": window} for window in WINDOWS])
     places = [found.names.index(name) for name in RIGID]
     away = np.abs(found.values - rest.values)[places]

@@ -9,26 +9,16 @@ import pytest
 
 from algid.estimators import refined, weak
 from algid.estimators.fit import Fit
-from algid.estimators.problem import Problem
 from algid.estimators.running import has_running, running
 from algid.estimators.whitening import NoiseLevels
-from algid.signals.segments import Segment
 
-from .conftest import Bench
-
-
-def _source(segment: Segment):  # type: ignore[no-untyped-def]
-    return lambda: iter([segment])
+from .conftest import Bench, problem_of
 
 
 def _fit(bench: Bench, estimator: str, seed: int, loaded: bool) -> Fit:
-    bare = [_source(bench.log(sigma=1e-4, seed=seed))]
-    burdened = [_source(bench.log(True, sigma=1e-4, seed=seed))] if loaded else []
-    return (
-        weak.fit(Problem(bare, burdened))
-        if estimator == "weak"
-        else refined.fit(Problem(bare, burdened))
-    )
+    bare, burdened = (bench.log(carries, 1e-4, seed) for carries in (False, True))
+    known = problem_of(bare, loaded=[burdened] * loaded)
+    return weak.fit(known) if estimator == "weak" else refined.fit(known)
 
 
 @pytest.mark.parametrize("estimator", ["weak", "refined"])
@@ -52,9 +42,7 @@ def test_half_way_it_is_what_half_of_the_log_tells(bench: Bench) -> None:
     """
     log = bench.log(sigma=1e-4, seed=2)
     known = NoiseLevels(np.full(2, 1e-4), np.full(2, 1e-3))
-    whole, half = (
-        refined.fit(Problem([_source(log.part(0, end))]), noise=known) for end in (4001, 2001)
-    )
+    whole, half = (refined.fit(problem_of(log.part(0, end)), noise=known) for end in (4001, 2001))
     found = running(whole, [4.0], 8)
     place = int(np.argmin(np.abs(found["t"] - 2.0)))
     assert found["t"][place] == pytest.approx(2.0, abs=0.04)

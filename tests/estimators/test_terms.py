@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
@@ -10,11 +12,11 @@ from scipy.signal import lfilter
 from algid.arm import CONSTANT_NAMES, FloatArray, forward_dynamics, with_payload
 from algid.estimators import refined, weak
 from algid.estimators.fit import Fit
-from algid.estimators.problem import Problem, WeakSettings
+from algid.estimators.problem import WeakSettings
 from algid.model import TERMS, UNITS, Model, Motion
 from algid.signals.segments import Segment
 from tests.estimators.by_hand import evaluated, torque_by_hand
-from tests.estimators.conftest import DT, Bench
+from tests.estimators.conftest import DT, Bench, problem_of
 
 SIGMA = 1e-4  # rad, and ten times as many N m
 VALUES = {
@@ -91,11 +93,9 @@ def _behind(tau: FloatArray, lag: float) -> FloatArray:
     return np.asarray(shown)
 
 
-def _fit(estimator: str, model: Model, log: Segment, loaded: Segment | None = None) -> Fit:
-    logs = [lambda: [log]], [] if loaded is None else [lambda: [loaded]]
-    if estimator == "weak":
-        return weak.fit(Problem(*logs, settings=WeakSettings(model=model)))
-    return refined.fit(Problem(*logs, settings=WeakSettings(model=model)))
+def _fit(estimator: str, model: Model, log: Segment, loaded: Sequence[Segment] = ()) -> Fit:
+    known = problem_of(log, loaded=loaded, settings=WeakSettings(model=model))
+    return weak.fit(known) if estimator == "weak" else refined.fit(known)
 
 
 @pytest.mark.parametrize("estimator", ["weak", "refined"])
@@ -125,7 +125,7 @@ def test_terms_that_are_not_linear_are_found_under_a_payload_too(
         estimator,
         model,
         term_log(bench, model, values),
-        term_log(bench, model, values, loaded=True),
+        [term_log(bench, model, values, loaded=True)],
     )
     assert fit.estimator == estimator
     known = {**values, "m_p": bench.payload, "l1": bench.arm.l1, "l2": bench.arm.l2}

@@ -1,28 +1,29 @@
 """Every kind of estimate, alone and together with the others, against a simulated arm with drives.
 
-The arm is moved here by a Runge-Kutta method of the test's own, all cases side by side; of algid
-it takes the equations of motion without drives, which `tests/test_arm.py` holds against SymPy.
+The arms move side by side by `pipelines.simulator`, which shares no equation with algid.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 import pytest
 
-from algid.arm import mass_matrix, passive_torque, with_payload
+from algid.arm import with_payload
 from algid.estimators import instruments, refined, weak
 from algid.estimators.fit import Fit
-from algid.estimators.problem import Problem, Source, WeakSettings
+from algid.estimators.problem import WeakSettings
 from algid.model import TERMS as MODEL_TERMS
 from algid.model import Model
 from algid.signals.segments import Segment
 from algid.signals.shift import TorqueShift
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
+from pipelines.simulator import Arms, swung
+from tests.estimators.conftest import problem_of
 
 DT, DURATION, SUBSTEPS = 2e-3, 5.0, 2
 TERMS = ("", "delay", "hold", "offset", "coulomb", "rotor", "delay hold offset coulomb rotor")
@@ -62,9 +63,9 @@ def cases() -> dict[tuple[str, bool], Case]:
         np.array([_true(name, terms) for terms, _ in jobs])
         for name in ("f1", "f2", "o1", "o2", "j2")
     )
+    arms = Arms(constants, coulomb=np.stack([f1, f2]), width=0.2, rotor=np.stack([0 * j2, j2]))
     torque = wide_multi_sine(case.arm, 5)
-    count = round(DURATION / DT)
-    h = DT / SUBSTEPS
+    count, h = round(DURATION / DT), DT / SUBSTEPS
     # the torque at the start, middle and end of each step: smooth, or held since the sample before
     steps = np.arange(count * SUBSTEPS)[:, None] * h + np.array([0, 0.5, 1]) * h
     applied = np.empty((len(steps), 3, 2, len(jobs)))
@@ -73,42 +74,38 @@ def cases() -> dict[tuple[str, bool], Case]:
         if "hold" in terms:
             at = np.repeat(np.floor(at[:, 1:2] / DT + 1e-9) * DT, 3, axis=1)
         applied[..., place] = torque(at.ravel()).reshape(2, *at.shape).transpose(1, 2, 0)
+    applied -= np.stack([o1, o2])
+    now = 0
 
-    def rate(x: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        theta, omega = x[:2], x[2:]
-        m11, m12, m22 = mass_matrix(constants, theta)
-        free = tau - passive_torque(constants, theta, omega) - np.stack([o1, o2])
-        free -= np.stack([f1, f2]) * np.tanh(omega / 0.2)
-        determinant = m11 * (m22 + j2) - m12**2
-        alpha = (
-            np.stack([(m22 + j2) * free[0] - m12 * free[1], m11 * free[1] - m12 * free[0]])
-            / determinant
-        )
-        return np.concatenate([omega, alpha])
+    def begin(half: int, _: np.ndarray) -> None:
+        nonlocal now
+        now = half // 2
 
-    x = np.repeat(np.array([-np.pi / 2, 0, 0, 0])[:, None], len(jobs), axis=1)
-    theta = np.empty((count, 2, len(jobs)))
-    for step, (start, middle, end) in enumerate(applied):
-        if step % SUBSTEPS == 0:
-            theta[step // SUBSTEPS] = x[:2]
-        a = rate(x, start)
-        b = rate(x + 0.5 * h * a, middle)
-        c = rate(x + 0.5 * h * b, middle)
-        x = x + h / 6 * (a + 2 * b + 2 * c + rate(x + h * c, end))
+    def acting(half: int, _: np.ndarray) -> np.ndarray:
+        return np.asarray(applied[now, half - 2 * now])
+
+    states, _ = swung(
+        lambda half, x: arms.rate(x, acting(half, x)),
+        acting,
+        arms.hanging(),
+        len(steps),
+        h,
+        sampled=begin,
+    )
     tau = torque(np.arange(count) * DT)
-    return {job: Case(job[0], theta[:, :, place].T, tau) for place, job in enumerate(jobs)}
+    theta = states[::SUBSTEPS, :2]
+    return {job: Case(job[0], theta[..., place].T, tau) for place, job in enumerate(jobs)}
 
 
-def _fit(estimator: str, terms: str, unloaded: list[Source], loaded: list[Source]) -> Fit:
+def _fit(estimator: str, terms: str, *unloaded: Segment, loaded: Sequence[Segment] = ()) -> Fit:
     model = Model(tuple(term for term in terms.split() if term in MODEL_TERMS))
     hold: Literal["foh", "zoh"] = "zoh" if "hold" in terms else "foh"
     delay = "delay" in terms
     settings = WeakSettings(model, shift=TorqueShift(hold == "zoh"), estimate_delay=delay)
+    known = problem_of(*unloaded, loaded=loaded, settings=settings)
     if estimator != "refined":
-        return (weak if estimator == "weak" else instruments).fit(
-            Problem(unloaded, loaded, settings)
-        )
-    return refined.fit(Problem(unloaded, loaded, settings))
+        return (weak if estimator == "weak" else instruments).fit(known)
+    return refined.fit(known)
 
 
 def _truth(fit: Fit) -> np.ndarray:
@@ -125,9 +122,7 @@ def test_every_kind_of_estimate_is_the_truth_within_its_error(
     cases: dict[tuple[str, bool], Case], estimator: str, terms: str, payload: bool
 ) -> None:
     logs = [cases[terms, False].log(seed) for seed in (1, 2)]
-    unloaded: list[Source] = [lambda log=log: [log] for log in logs]  # type: ignore[misc]
-    loaded: list[Source] = [lambda: [cases[terms, True].log(3)]] if payload else []
-    fit = _fit(estimator, terms, unloaded, loaded)
+    fit = _fit(estimator, terms, *logs, loaded=[cases[terms, True].log(3)] * payload)
     assert fit.estimator == estimator
     assert set(fit.status) == {"OK"}
     truth = _truth(fit)
@@ -144,7 +139,7 @@ def test_long_delays_are_found_by_both_estimators(
 ) -> None:
     log = cases["", False].log(1)
     late = replace(log, theta=log.theta[:, :-samples], tau=log.tau[:, samples:])  # 20 and 50 ms
-    fit = _fit(estimator, "delay", [lambda: [late]], [])
+    fit = _fit(estimator, "delay", late)
     assert fit.estimator == estimator
     assert abs(fit.values[-1] - samples * DT) < 5 * fit.std[-1]
 
@@ -163,7 +158,7 @@ def test_nothing_that_a_fit_hands_out_can_be_written_to(
 ) -> None:
     log = cases["", False].log(1)
     for estimator in ("weak", "refined"):
-        found = list(_arrays(_fit(estimator, "delay", [lambda: [log]], [])))
+        found = list(_arrays(_fit(estimator, "delay", log)))
         assert len(found) >= 6  # values, covariance, travel; the log's c0, S, g
         assert not any(array.flags.writeable for array in found)
     assert not any(array.flags.writeable for array in (log.theta, log.tau, log.part(0, 9).theta))

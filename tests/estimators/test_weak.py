@@ -1,12 +1,10 @@
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from algid.arm import FloatArray
 from algid.estimators import weak
-from algid.estimators import weak as normal
 from algid.estimators.problem import Problem, WeakSettings
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
@@ -14,37 +12,24 @@ from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 from tests.intervals import holds_95, in_axes
 
-from .conftest import Bench
-
-
-def _cut(log: Segment, *edges: int) -> list[Segment]:
-    ends = [0, *edges, len(log)]
-    return [log.part(first, last) for first, last in pairwise(ends)]
+from .conftest import Bench, problem_of
 
 
 def test_recorded_velocities_serve_as_well(bench: Bench) -> None:
-    fit = weak.fit(Problem([lambda: [bench.log()]], settings=WeakSettings(bandwidth=None)))
+    fit = weak.fit(problem_of(bench.log(), settings=WeakSettings(bandwidth=None)))
     assert np.allclose(fit.values, bench.truth[:7], rtol=1e-6)  # quadrature alone
     without = replace(bench.log(), omega=None)
     with pytest.raises(ValueError, match="no velocities"):
-        weak.fit(Problem([lambda: [without]], settings=WeakSettings(bandwidth=None)))
+        weak.fit(problem_of(without, settings=WeakSettings(bandwidth=None)))
 
 
-def test_blocks_of_any_size_give_the_same_normal_equations(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(normal, "PIECE_SAMPLES", 1111)
+def test_no_window_is_lost_between_pieces(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     log = bench.log(sigma=1e-3)
-    whole = normal.normal_equations(lambda: [log], WeakSettings(window=0.2))
-    cut = normal.normal_equations(lambda: _cut(log, 17, 1200, 1201, 3500), WeakSettings(window=0.2))
-    assert whole is not None
-    assert cut is not None
-    assert np.array_equal(whole.gram, cut.gram)
-    monkeypatch.setattr(normal, "PIECE_SAMPLES", 16384)
-    single = normal.normal_equations(lambda: [log], WeakSettings(window=0.2))
-    assert single is not None
-    assert np.array_equal(single.rows, whole.rows)  # no window is lost between pieces
-    assert np.allclose(single.gram.sum(axis=0), whole.gram.sum(axis=0), rtol=1e-11)
+    whole = weak.normal_equations(lambda: [log], WeakSettings(window=0.2))
+    monkeypatch.setattr(weak, "PIECE_SAMPLES", 1111)
+    cut = weak.normal_equations(lambda: [log], WeakSettings(window=0.2))
+    assert np.array_equal(whole.rows, cut.rows)
+    assert np.allclose(whole.gram.sum(axis=0), cut.gram.sum(axis=0), rtol=1e-11)
 
 
 @pytest.mark.slow
@@ -60,7 +45,7 @@ def test_intervals_of_a_long_log_hold() -> None:
     def ratios(seed: int) -> FloatArray:
         noise = np.random.default_rng(seed).standard_normal((2, *motion.theta.shape))
         log = Segment(0.0, dt, motion.theta + 1e-4 * noise[0], motion.tau + 1e-2 * noise[1])
-        fit = weak.fit(Problem([lambda: [log]]))
+        fit = weak.fit(problem_of(log))
         assert fit.intervals == "sandwich"
         return in_axes(fit.values - k, fit.covariance, fit.quantile)
 

@@ -20,7 +20,8 @@ from .conftest import Bench
 NOISE = NoiseLevels(np.array([1e-3, 2e-3]), np.array([1e-2, 2e-2]))
 
 
-def _dense(H: np.ndarray, first: int, length: int) -> np.ndarray:
+def dense(H: np.ndarray, first: int, length: int) -> np.ndarray:
+    """The matrix (2 n, 2 length) of a band (2, 2, POINTS, n), joint by joint within a sample."""
     n = H.shape[-1]
     matrix = np.zeros((n, 2, length, 2))
     for row in range(n):
@@ -32,13 +33,13 @@ def _dense(H: np.ndarray, first: int, length: int) -> np.ndarray:
 def test_products_and_factor_agree_with_dense_algebra() -> None:
     rng = np.random.default_rng(0)
     H = rng.standard_normal((2, 2, POINTS, 20))
-    dense = _dense(H, 2, 30)
+    whole = dense(H, 2, 30)
     x, y = rng.standard_normal((2, 30)), rng.standard_normal((2, 20))
-    assert np.allclose(forward(H, x, 2).T.ravel(), dense @ x.T.ravel())
-    assert np.allclose(adjoint(H, y, 2, 30).T.ravel(), dense.T @ y.T.ravel())
+    assert np.allclose(forward(H, x, 2).T.ravel(), whole @ x.T.ravel())
+    assert np.allclose(adjoint(H, y, 2, 30).T.ravel(), whole.T @ y.T.ravel())
     band = covariance_factor(H)
-    L = _lower(band)
-    assert np.allclose(L @ L.T, np.eye(40) + dense @ dense.T)
+    L = lower(band)
+    assert np.allclose(L @ L.T, np.eye(40) + whole @ whole.T)
 
 
 def test_a_held_torques_noise_is_that_of_neighbouring_samples() -> None:
@@ -47,13 +48,11 @@ def test_a_held_torques_noise_is_that_of_neighbouring_samples() -> None:
     H of stencils: L Lᵀ = F Fᵀ + H Hᵀ, both joints each for itself in F.
     """
     H = np.random.default_rng(1).standard_normal((2, 2, POINTS, 20))
-    dense = _dense(H, 0, 20 + POINTS - 1)
-    weights = np.zeros((20, 22))
-    for row in range(20):
-        weights[row, row : row + 3] = HELD
+    whole = dense(H, 0, 20 + POINTS - 1)
+    weights = moving_sum(HELD, 20)
     F = np.kron(weights @ weights.T, np.eye(2))
-    L = _lower(covariance_factor(H, HELD))
-    np.testing.assert_allclose(L @ L.T, F + dense @ dense.T, atol=1e-12 * 40 * POINTS)
+    L = lower(covariance_factor(H, HELD))
+    np.testing.assert_allclose(L @ L.T, F + whole @ whole.T, atol=1e-12 * 40 * POINTS)
 
 
 def test_information_is_the_schur_complement_of_the_normal_equations(bench: Bench) -> None:
@@ -65,8 +64,8 @@ def test_information_is_the_schur_complement_of_the_normal_equations(bench: Benc
     g = linear.columns[:-1] @ linear.columns[-1]
     # Dense: angles' changes x (in σ_θ) and dk from [I 0; H Y] [x; dk] = [θ_m − θ0; τ_m − f], all
     # in σ.
-    H = _dense(linear.H, linear.first, 120)
-    unwhitened = _lower(linear.factor) @ linear.columns.T
+    H = dense(linear.H, linear.first, 120)
+    unwhitened = lower(linear.factor) @ linear.columns.T
     Y = unwhitened[:, :-1]
     covariance = np.eye(H.shape[0]) + H @ H.T
     reference = Y.T @ np.linalg.solve(covariance, Y)
@@ -85,11 +84,19 @@ def test_information_is_the_schur_complement_of_the_normal_equations(bench: Benc
     residual = np.concatenate([moved, unwhitened[:, -1] + H @ moved])
     right = np.concatenate([np.eye(240), H]).T @ residual
     both = np.concatenate([right, np.concatenate([np.zeros((240, 7)), Y]).T @ residual])
-    dense = np.linalg.solve(normal, both)
-    assert np.allclose(dense[240:], np.linalg.solve(S, g), rtol=1e-5)
+    together = np.linalg.solve(normal, both)
+    assert np.allclose(together[240:], np.linalg.solve(S, g), rtol=1e-5)
 
 
-def _lower(factor: np.ndarray) -> np.ndarray:
+def moving_sum(taps: np.ndarray, n: int) -> np.ndarray:
+    """The matrix (n, n + taps - 1) that weighs neighbours."""
+    return np.asarray(
+        sum(np.eye(n, n + taps.size - 1, place) * tap for place, tap in enumerate(taps))
+    )
+
+
+def lower(factor: np.ndarray) -> np.ndarray:
+    """The matrix of a banded factor."""
     return np.asarray(
         sum(np.diag(factor[-1 - below, below:], -below) for below in range(2 * POINTS))
     )

@@ -9,12 +9,13 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.estimators import refined
-from algid.estimators.problem import Problem, WeakSettings
+from algid.estimators.problem import WeakSettings
 from algid.estimators.refined import likeliest_width
 from algid.model import Model
 from algid.signals.segments import Segment
 from pipelines.accuracy_scenes import random_arm
 from pipelines.simulator import WIDTH, Controller, Plan, controlled
+from tests.estimators.conftest import problem_of
 
 SEED = 415  # an arm that nothing was tuned on
 
@@ -48,7 +49,7 @@ def test_the_width_that_starts_the_fit_does_not_stay_in_it() -> None:
     for start in (0.02, 0.2):
         model = Model(("coulomb",), coulomb_speed=start)
         settings = WeakSettings(model=model, bandwidth=60.0)
-        found.append(refined.fit(Problem([lambda: [log]], settings=settings)))
+        found.append(refined.fit(problem_of(log, settings=settings)))
     for fit in found:
         assert (fit.estimator, fit.converged) == ("refined", True)
         # three seconds with a dozen reversals tell it to a factor of two
@@ -76,6 +77,6 @@ def test_friction_that_is_not_there_leaves_its_width_open_and_nothing_else() -> 
     still = replace(log, theta=log.theta[:, :400], tau=log.tau[:, :400])
     model = Model(("coulomb",), coulomb_speed=0.2)
     settings = WeakSettings(model=model, bandwidth=60.0)
-    fit = refined.fit(Problem([lambda: [still]], settings=settings))
+    fit = refined.fit(problem_of(still, settings=settings))
     assert np.all(np.isfinite(fit.covariance))
     assert fit.covariance.shape == (truth.size, truth.size)

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import gzip
 import hashlib
-import json
 import sqlite3
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import zstandard
 from mcap.writer import CompressionType, Writer
-from pyarrow import feather, parquet
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Writer2
-from scipy.io import savemat
 
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log, Origin
@@ -29,7 +25,19 @@ from algid.readers import read_log
 from algid.writers import FORMATS, mcap, write_log
 from tests.readers.logs import EPOCH_NS, TRUTH
 from tests.readers.mcaps import NO_INDEX, TOPIC, messages_of, write_mcap
-from tests.readers.ways import STORES, Message, States, fill, written
+from tests.readers.ways import (
+    Flat,
+    Message,
+    States,
+    arrow_table,
+    bag1,
+    bag2,
+    sent,
+    store,
+    store_table,
+    units,
+    written,
+)
 
 ROWS = 300
 DRAW = np.random.default_rng(5)
@@ -44,6 +52,10 @@ def log(start_ns: int = EPOCH_NS, velocity: bool = True) -> Log:
     """The samples that all of these files hold."""
     omega = VALUES[4:] if velocity else None
     return Log(start_ns + STAMPS, VALUES[:2], VALUES[2:4], Origin("", "", {}), omega)
+
+
+def _flat(way: str, columns: dict[str, Any]) -> Callable[[Path], Made]:
+    return lambda folder: written(way, folder, Flat(columns))
 
 
 @dataclass(frozen=True)
@@ -229,23 +241,10 @@ def clocks() -> dict[str, Callable[[Path], Made]]:
 
 def _arrow(columns: dict[str, Any], suffix: str = "parquet", **options: Any) -> Callable[..., Made]:
     def make(folder: Path) -> Path:
-        path = folder / f"log.{suffix}"
         arrow = columns if isinstance(columns, pa.Table) else pa.table(columns)
-        if suffix == "parquet":
-            parquet.write_table(arrow, path, **options)
-        else:
-            feather.write_feather(arrow, str(path), **options)
-        return path
+        return store_table(folder / f"log.{suffix}", arrow, **options)
 
     return make
-
-
-def with_units() -> pa.Table:
-    """Degrees and millinewton metres, as the fields' metadata say."""
-    plain = pa.table(table())
-    units = {"t": "s", "theta1": "deg", "theta2": "deg", "tau1": "mN m", "tau2": "mN m"}
-    fields = [field.with_metadata({"unit": units[field.name]}) for field in plain.schema]
-    return plain.cast(pa.schema(fields))
 
 
 def arrow_tables() -> dict[str, Any]:
@@ -284,31 +283,17 @@ def arrow_tables() -> dict[str, Any]:
         | {"tau1": pa.array(plain["tau1"]).cast(pa.decimal128(38, 20)), "tau2": plain["tau2"]},
         "a dictionary": plain | {"tau2": pa.array(plain["tau2"]).dictionary_encode()},
         "missing values": gaps,
-        "units": with_units(),
+        "units": arrow_table(units(plain, "s,deg,deg,mN m,mN m", "unit")),
     }
 
 
+GROUPS = {"mat packed": "run.log.", "hdf5": "run.", "hdf5 packed": "run."}
+
+
 def _archive(form: str, columns: dict[str, Any]) -> Callable[[Path], Made]:
-    def make(folder: Path) -> Path:
-        path = folder / f"log.{form.split()[0]}"
-        if form == "npz":
-            np.savez(path, **columns)
-        elif form == "npz packed":
-            np.savez_compressed(path, **columns)
-        elif form == "mat":
-            savemat(path, columns)
-        elif form == "mat packed":
-            savemat(path, {"run": {"log": columns}}, do_compression=True)
-        else:
-            import h5py
-
-            with h5py.File(path, "w") as file:
-                for name, values in columns.items():
-                    packing = {"compression": "gzip", "chunks": True} if "packed" in form else {}
-                    file.create_dataset(f"run/{name}", data=values, **packing)
-        return path
-
-    return make
+    kind, _, packed = form.partition(" ")
+    arrays = {GROUPS.get(form, "") + name: values for name, values in columns.items()}
+    return lambda folder: store(folder / f"log.{kind}", arrays, bool(packed))
 
 
 def arrays() -> dict[str, Callable[[Path], Made]]:
@@ -327,43 +312,35 @@ def arrays() -> dict[str, Callable[[Path], Made]]:
     return found
 
 
-def _lines(*objects: dict[str, Any]) -> Callable[[Path], Made]:
-    text = "".join(json.dumps(one) + "\n" for one in objects)
-    return _of_bytes("log.jsonl", text.encode())
-
-
 def json_lines() -> dict[str, Callable[[Path], Made]]:
     """A JSON object a line."""
-    time = (STAMPS * 1e-9).tolist()
-    joints = ("q", "tau_est", "dq")
-    states = [
-        {
-            "t": time[row],
-            "mode": "run",
-            "motor_state": [
-                dict(zip(joints, VALUES[one::2, row].tolist(), strict=True)) for one in (0, 1)
-            ],
-        }
-        for row in range(ROWS)
+    time = STAMPS * 1e-9
+    motors = [
+        [dict(zip(("q", "tau_est", "dq"), own[one::2], strict=True)) for one in (0, 1)]
+        for own in VALUES.T.tolist()
     ]
-    lists = [
-        {"t": time[row], "q": VALUES[:2, row].tolist(), "tau": VALUES[2:4, row].tolist()}
-        for row in range(ROWS)
-    ]
-    gaps = [dict(one) for one in lists]
-    del gaps[7]["tau"]
-    whole = [dict(zip(("t", *NAMES), (row, 1, -2, 3, row), strict=True)) for row in range(ROWS)]
+    lists = {"t": time, "q": VALUES[:2].T.tolist(), "tau": VALUES[2:4].T.tolist()}
+    whole = dict(
+        zip(
+            ("t", *NAMES),
+            (range(ROWS), *([one] * ROWS for one in (1, -2, 3)), range(ROWS)),
+            strict=True,
+        )
+    )
+
+    def without_torques(folder: Path) -> Path:
+        path: Path = written("jsonl", folder, Flat(lists))
+        lines = path.read_text().splitlines(keepends=True)
+        lines[7] = lines[7].partition(', "tau"')[0] + "}\n"
+        path.write_text("".join(lines))
+        return path
+
     return {
-        "nested": _lines(*states),
-        "lists": _lines(*lists),
-        "a line without torques": _lines(*gaps),
-        "whole numbers": _lines(*whole),
-        "flat": _lines(
-            *(
-                dict(zip(("t", *NAMES), [time[row], *VALUES[:4, row].tolist()], strict=True))
-                for row in range(ROWS)
-            )
-        ),
+        "nested": _flat("jsonl", {"t": time, "mode": ["run"] * ROWS, "motor_state": motors}),
+        "lists": _flat("jsonl", lists),
+        "a line without torques": without_torques,
+        "whole numbers": _flat("jsonl", whole),
+        "flat": _flat("jsonl", table()),
     }
 
 
@@ -372,15 +349,10 @@ def json_lines() -> dict[str, Callable[[Path], Made]]:
 
 def _mcap(
     messages: Callable[[], list[tuple[str, int, bytes]]],
-    schemas: dict[str, tuple[str, str, bytes]] | None = None,
     settings: dict[str, Any] | None = None,
     **options: Any,
 ) -> Callable[[Path], Made]:
-    def make(folder: Path) -> Made:
-        write_mcap(folder / "log.mcap", messages(), schemas, **options)
-        return folder / "log.mcap", settings or {}
-
-    return make
+    return lambda folder: (write_mcap(folder / "log.mcap", messages(), **options), settings or {})
 
 
 def with_imu() -> list[tuple[str, int, bytes]]:
@@ -396,17 +368,11 @@ def with_imu() -> list[tuple[str, int, bytes]]:
 IMU = {"/imu": ("sensor_msgs/msg/Imu", "ros2msg", b"float64[7] values")}
 
 
-def _sent(way: str, sent: list[Message], **settings: Any) -> Callable[[Path], Made]:
-    return lambda folder: (written(way, folder, States(sent)), settings)
+def _sent(way: str, messages: list[Message], **settings: Any) -> Callable[[Path], Made]:
+    return lambda folder: (written(way, folder, States(messages)), settings)
 
 
-def joint_states(velocity: bool = False) -> list[Message]:
-    """The states, with velocities or without."""
-    found = []
-    for row, stamp in enumerate(log().stamp_ns.tolist()):
-        one = Message(VALUES[:2, row].tolist(), VALUES[2:4, row].tolist(), stamp, stamp)
-        found.append(replace(one, velocity=VALUES[4:, row].tolist()) if velocity else one)
-    return found
+STILL = log(velocity=False)
 
 
 def six_joints() -> list[Message]:
@@ -423,7 +389,7 @@ def six_joints() -> list[Message]:
 def two_topics() -> list[Message]:
     """Angles on one topic, and torques on another at other times."""
     found = []
-    for one in joint_states():
+    for one in sent(STILL):
         later = one.stamp + 300_000
         found.append(replace(one, effort=(), topic="/q"))
         found.append(replace(one, position=(), topic="/tau", stamp=later, log_stamp=later))
@@ -437,31 +403,16 @@ TWO = {
 }
 
 
-def ros1(folder: Path, packing: Any = None) -> Path:
-    """The states as a ROS 1 bag of small chunks."""
-    writer = Writer1(folder / "log.bag")
-    writer.chunk_threshold = 4096
-    if packing is not None:
-        writer.set_compression(packing)
-    with writer:
-        fill(writer, STORES[0], States(joint_states(velocity=True)), {"seq": 0})
-    return folder / "log.bag"
-
-
-def ros2(folder: Path, plugin: StoragePlugin, version: Literal[8, 9] = 9) -> Path:
-    """The states as a rosbag2 folder."""
-    with Writer2(folder / "bag", version=version, storage_plugin=plugin) as writer:
-        fill(writer, STORES[1], States(joint_states(velocity=True)), {})
-    return folder / "bag"
+WHOLE = States(sent(log()))
 
 
 def _loose(folder: Path) -> Path:
-    (path,) = ros2(folder, StoragePlugin.SQLITE3).glob("*.db3")
+    (path,) = bag2(folder, WHOLE).glob("*.db3")
     return path
 
 
 def _unlisted(folder: Path) -> Path:
-    bag = ros2(folder, StoragePlugin.SQLITE3)
+    bag = bag2(folder, WHOLE)
     (bag / "metadata.yaml").unlink()
     return bag
 
@@ -543,17 +494,17 @@ def mcaps() -> dict[str, Callable[[Path], Made]]:
         "without checksums": _mcap(states, enable_crcs=False),
         "a message a chunk": _mcap(states, chunk_size=1),
         "one chunk": _mcap(states, chunk_size=1 << 22),
-        "another topic between": _mcap(with_imu, IMU),
-        "another topic between, no index": _mcap(with_imu, IMU, **NO_INDEX),
+        "another topic between": _mcap(with_imu, schemas=IMU),
+        "another topic between, no index": _mcap(with_imu, schemas=IMU, **NO_INDEX),
         "big endian": _mcap(lambda: messages_of(log(), order=">")),
         "log time": _mcap(states, settings={"clock": "log"}),
         "headers that stand still": _sent(
-            "cdr", [replace(one, stamp=0, name=("joint1", "joint2")) for one in joint_states()]
+            "cdr", [replace(one, stamp=0, name=("joint1", "joint2")) for one in sent(STILL)]
         ),
         "two of six joints": _sent("cdr", six_joints(), joints=["arm_joint_2", "arm_joint_5"]),
         "two topics": _sent("cdr", two_topics(), **TWO),
-        "JSON": _sent("json", joint_states()),
-        "Protobuf": _sent("pb", joint_states()),
+        "JSON": _sent("json", sent(STILL)),
+        "Protobuf": _sent("pb", sent(STILL)),
         "channels of two publishers": _redefined_alike,
         "references": _referenced,
     }
@@ -562,15 +513,13 @@ def mcaps() -> dict[str, Callable[[Path], Made]]:
 
 def bags() -> dict[str, Callable[[Path], Made]]:
     """Messages in bags of both generations."""
-    packings = Writer1.CompressionFormat
-    sqlite, chunks = StoragePlugin.SQLITE3, StoragePlugin.MCAP
     return {
-        "ROS 1": ros1,
-        "ROS 1, lz4": lambda folder: ros1(folder, packing=packings.LZ4),
-        "ROS 1, bz2": lambda folder: ros1(folder, packing=packings.BZ2),
-        "folder of SQLite": lambda folder: ros2(folder, sqlite),
-        "folder of SQLite, version 8": lambda folder: ros2(folder, sqlite, 8),
-        "folder of MCAP": lambda folder: ros2(folder, chunks),
+        "ROS 1": lambda folder: bag1(folder, WHOLE),
+        "ROS 1, lz4": lambda folder: bag1(folder, WHOLE, Writer1.CompressionFormat.LZ4),
+        "ROS 1, bz2": lambda folder: bag1(folder, WHOLE, Writer1.CompressionFormat.BZ2),
+        "folder of SQLite": lambda folder: bag2(folder, WHOLE),
+        "folder of SQLite, version 8": lambda folder: bag2(folder, WHOLE, version=8),
+        "folder of MCAP": lambda folder: bag2(folder, WHOLE, StoragePlugin.MCAP),
         "folder of two MCAP files": _splits,
         "SQLite file": _loose,
         "SQLite file without definitions": _without_definitions,

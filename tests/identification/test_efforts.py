@@ -15,7 +15,7 @@ from algid.base.errors import LogError, SettingError
 from algid.identification.known import prior_of
 from algid.identification.validate import predictor_of
 from algid.inspection.checks import inspect_log
-from algid.log import Log, Origin
+from algid.log import Log
 from algid.notices import has_code
 from algid.profile import Profile
 from algid.results import Result
@@ -23,11 +23,10 @@ from algid.settings import Settings
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
+from tests.golden.scenes import log_of, times
 from tests.intervals import distances
 from tests.readers.headers import opened
 
-RATE, DURATION = 250.0, 3.0
-SIGMA_THETA, SIGMA_TAU = 3e-4, 1e-2  # rad, N m
 CHANCE = 4.5  # standard deviations: once in 150 000
 CASE = load_case("case1")
 ARM = CASE.arm.constants()
@@ -36,8 +35,8 @@ LOADED = CASE.arm.phasors(CASE.payload)[:7]
 
 @cache
 def moved(loaded: bool) -> SimulatedMotion:
-    t = np.arange(round(DURATION * RATE) + 1) / RATE
-    return simulate(LOADED if loaded else ARM, wide_multi_sine(CASE.arm, 5 + loaded), t)
+    wide = wide_multi_sine(CASE.arm, 5 + loaded)
+    return simulate(LOADED if loaded else ARM, wide, times(duration=3.0))
 
 
 def weight(k: FloatArray, motion: SimulatedMotion) -> FloatArray:
@@ -66,20 +65,11 @@ TAKEN: dict[str, Taken] = {
 
 
 def logs(effort: str) -> tuple[Log, Log]:
-    rng = np.random.default_rng(0)
-    found = []
-    for loaded in (False, True):
-        motion = moved(loaded)
-        tau = motion.tau - TAKEN[effort](motion, loaded)
-        found.append(
-            Log(
-                np.round(motion.t * 1e9).astype(np.int64),
-                motion.theta + SIGMA_THETA * rng.standard_normal(tau.shape),
-                tau + SIGMA_TAU * rng.standard_normal(tau.shape),
-                Origin(f"{loaded}.csv", "csv", {}),
-            )
-        )
-    return found[0], found[1]
+    bare, burdened = (
+        log_of(moved(loaded), moved(loaded).tau - TAKEN[effort](moved(loaded), loaded), loaded)
+        for loaded in (False, True)
+    )
+    return bare, burdened
 
 
 @cache

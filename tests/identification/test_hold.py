@@ -36,8 +36,6 @@ def test_a_log_tells_its_hold(held: bool) -> None:
     log, k = moved(held)
     result = identify(log, report=False)
     fit = result.fit
-    assert fit is not None
-    assert fit.torque_hold is not None
     hold = fit.torque_hold
     assert (hold.asked, hold.used, hold.told) == ("auto", "zoh" if held else "foh", True)
     assert result.settings["torque_hold"] == hold.used
@@ -48,8 +46,6 @@ def test_a_log_tells_its_hold(held: bool) -> None:
     other = identify(log, settings=wrong, report=False)
     now = [result.parameters[name].estimate or 0.0 for name in CONSTANT_NAMES]
     assert np.abs(distances(other, now)).max() > FARTHEST
-    assert other.fit is not None
-    assert other.fit.torque_hold is not None
     assert other.fit.torque_hold.asked == other.fit.torque_hold.used != hold.used
 
 
@@ -59,13 +55,10 @@ def test_where_a_log_does_not_tell_the_intervals_hold_both() -> None:
     log = here.log(np.random.default_rng(2)).part(2000, 5000)
     result = identify(log, settings=Settings(model="plain"), report=False)
     hold = result.fit.torque_hold if result.fit is not None else None
-    assert hold is not None
     assert hold.told is False
     assert "TORQUE_HOLD" in [one.code for one in result.notices]
     assert result.verdict.grade == "good"
     low, high = result.parameters["delay"].ci95 or (None, None)
-    assert low is not None
-    assert high is not None
     assert low < 5e-4 < high
     assert np.nanmax(np.abs(distances(result, here.arm.constants()))) < FARTHEST
 
@@ -74,8 +67,6 @@ def test_a_payload_is_weighed_with_the_hold_of_its_arm() -> None:
     log, _ = moved(held=True)
     arm = identify(log, report=False)
     again = identify(None, log, parameters=arm, report=False)
-    assert again.fit is not None
-    assert again.fit.torque_hold is not None
     assert again.fit.torque_hold.used == "zoh"
 
 
@@ -86,8 +77,6 @@ def test_a_slow_log_of_a_faster_controller_leaves_open_how_late_it_acts() -> Non
     result = identify(log, report=False)
     assert "TORQUE_HOLD" in [one.code for one in result.notices]
     delay = result.parameters["delay"]
-    assert delay.estimate is not None
-    assert delay.std is not None
     assert abs(delay.estimate - 5e-4) < FARTHEST * delay.std < 1.5e-3
     off = distances(result, here.arm.constants())
     assert abs(off[CONSTANT_NAMES.index("k6")]) < FARTHEST

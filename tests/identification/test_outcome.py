@@ -60,9 +60,7 @@ def survey(*, loaded: bool = True) -> Recordings:
 def summed(fit: Fit, chosen: Selection | None = None, **settings: Any) -> FitSummary:
     chosen = chosen or Selection(fit.shared.model, False)
     recordings = survey(loaded=fit.shared.payload)
-    found = outcome_of(Fitted(fit, recordings, Settings(**settings), chosen)).fit
-    assert found is not None
-    return found
+    return outcome_of(Fitted(fit, recordings, Settings(**settings), chosen)).fit
 
 
 def test_an_estimate_has_its_interval_and_one_that_is_open_has_nothing_but_its_unit() -> None:
@@ -132,7 +130,6 @@ def test_a_bound_broken_by_far_spoils_every_estimate_and_one_broken_by_chance_no
         fit = with_stds(with_values(fit_of(), k6=k6), k6=1.0)
         found = outcome_of(Fitted(fit, survey()))
         assert {one.status for one in (found.parameters | found.payload).values()} == {status}
-        assert found.fit is not None
         assert [one.bound for one in found.fit.broken_bounds] == ["k6 >= 0"]
 
 
@@ -179,7 +176,6 @@ def test_each_log_tells_its_own_estimates() -> None:
 @pytest.mark.parametrize("known", [0.4, PAYLOAD, 2.0])
 def test_the_torques_gain_is_the_known_mass_over_the_found_one(known: float) -> None:
     found = summed(fit_of(), payload_mass=known).torque_gain
-    assert found is not None
     assert found.estimate == pytest.approx(known / PAYLOAD, rel=1e-12)
     assert found.std == pytest.approx(0.01 * known / PAYLOAD, rel=1e-12)
     ends = (known / (PAYLOAD * (1 + 0.01 * QUANTILE)), known / (PAYLOAD * (1 - 0.01 * QUANTILE)))
@@ -191,7 +187,6 @@ def test_a_prediction_without_samples_is_none_and_others_hold_their_sums() -> No
     rows = np.array([[0.0, 50.0], [400.0, 125.0], [0.0, 0.0], [4.0, 9.0]])
     sums = PredictionScore(100.0, np.concatenate([rows, np.zeros((5, 2))]))
     found = prediction(sums)
-    assert found is not None
     assert found.rmse == pytest.approx((0.2, 0.3))
     assert found.nrmse == pytest.approx((0.1, math.sqrt(9 / 125)))
     # 125 − 50²/100 = 100 is the variance left to explain
@@ -279,8 +274,6 @@ def test_an_interval_that_contains_zero_is_never_ok() -> None:
         assert every["k4"].status is Status.OK
         for one in every.values():
             low, high = one.ci95 or (None, None)
-            assert low is not None
-            assert high is not None
             assert (one.status is Status.OK) is not (low <= 0 <= high)
 
 

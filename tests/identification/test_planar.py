@@ -8,44 +8,30 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.identification.identify import identify
-from algid.log import Log, Origin
-from algid.synth.cases import load_case
+from algid.log import Log
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 from pipelines.planar import PAYLOAD, Row, drawn, scene
+from tests.golden.scenes import ARM, log_of, times
+from tests.golden.scenes import PAYLOAD as CARRIED
 from tests.intervals import distances
 
-RATE, DURATION = 250.0, 4.0
-SIGMA_THETA, SIGMA_TAU = 3e-4, 1e-2  # rad, N m
 CHANCE = 4.5  # standard deviations: once in 150 000
 
 
 def moved(constants: FloatArray, seed: int) -> Log:
     """A log of the paper's first arm with these constants, under a wide torque."""
-    t = np.arange(round(DURATION * RATE) + 1) / RATE
-    motion = simulate(constants, wide_multi_sine(load_case("case1").arm, seed), t)
-    rng = np.random.default_rng(seed)
-    return Log(
-        np.round(t * 1e9).astype(np.int64),
-        motion.theta + SIGMA_THETA * rng.standard_normal(motion.theta.shape),
-        motion.tau + SIGMA_TAU * rng.standard_normal(motion.tau.shape),
-        Origin(f"{seed}.csv", "csv", {}),
-    )
+    motion = simulate(constants, wide_multi_sine(ARM, seed), times())
+    return log_of(motion, motion.tau, seed)
 
 
 def test_a_payload_off_the_line_of_a_straight_arm_is_found() -> None:
-    case = load_case("case1")
-    x, y, J = 0.9 * case.arm.l2, 0.3 * case.arm.l2, 2e-4
-    result = identify(
-        moved(case.arm.phasors(), 1),
-        moved(case.arm.phasors(case.payload, x, y, J), 2),
-        report=False,
-    )
-    assert result.fit is not None
-    assert result.fit.model is not None
+    x, y, J = 0.9 * ARM.l2, 0.3 * ARM.l2, 2e-4
+    logs = moved(ARM.phasors(), 1), moved(ARM.phasors(CARRIED, x, y, J), 2)
+    result = identify(*logs, report=False)
     assert result.fit.model.terms == ["phases"]
     assert result.fit.intervals == "likelihood"  # not refuted
-    truth = {"m_p": case.payload, "l1": case.arm.l1, "l2": x, "y_p": y, "J_p": J, "k1s": 0.0}
+    truth = {"m_p": CARRIED, "l1": ARM.l1, "l2": x, "y_p": y, "J_p": J, "k1s": 0.0}
     assert np.abs(distances(result, truth.values(), list(truth))).max() < CHANCE
 
 
@@ -62,9 +48,8 @@ def test_an_offset_is_not_taken_for_an_inertia_where_both_would_make_that_negati
 
 
 def test_phases_are_a_note_of_what_they_mean_and_no_accusation() -> None:
-    case = load_case("case1")
     off1, off2, bent1, bent2 = np.radians([4.0, -3.0, 8.0, 12.0])
-    arm = replace(case.arm, delta1=float(bent1), delta2=float(bent2))
+    arm = replace(ARM, delta1=float(bent1), delta2=float(bent2))
     log = moved(arm.phasors(), 3)
     log = replace(log, theta=log.theta - np.array([[off1], [off2]]))
     result = identify(log, report=False)

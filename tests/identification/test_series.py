@@ -98,26 +98,21 @@ def test_the_predicted_torque_is_that_of_the_equation_of_motion(
         column = {name: np.concatenate([block[name] for block in own]) for name in own[0]}
         assert column["log"].dtype == np.int32
         np.testing.assert_allclose(column["t"], log.t, atol=1e-12)
-        for joint in range(2):
-            np.testing.assert_array_equal(column[f"theta{joint + 1}"], log.theta[joint])
-            np.testing.assert_array_equal(column[f"tau{joint + 1}"], log.tau[joint])
-            speed = np.sqrt(np.mean(omega[joint] ** 2))
-            # smoothed at 40 Hz and by differences of second order: (2π f dt)²/6 of motion up to 8
-            # Hz
-            np.testing.assert_allclose(
-                column[f"omega{joint + 1}"][50:-50], omega[joint, 50:-50], atol=5e-3 * speed
-            )
-            known = column[f"tau{joint + 1}_predicted"]
-            inner = ~np.isnan(known)
-            assert 0.9 * known.size < inner.sum() < known.size
-            assert not inner[0]
-            assert not inner[-1]
-            assert (
-                np.flatnonzero(~inner[: known.size // 2]).size
-                == np.flatnonzero(~inner[known.size // 2 :]).size
-            )
-            off = known[inner] - log.tau[joint, inner]
-            assert np.sqrt(np.mean(off**2)) < 0.02 * np.sqrt(np.mean(log.tau[joint] ** 2))
+        theta, tau, seen, predicted = (
+            np.stack([column[name.format(joint)] for joint in (1, 2)])
+            for name in ("theta{}", "tau{}", "omega{}", "tau{}_predicted")
+        )
+        np.testing.assert_array_equal(theta, log.theta)
+        np.testing.assert_array_equal(tau, log.tau)
+        # smoothed at 40 Hz and by differences of second order: (2π f dt)²/6 of motion up to 8 Hz
+        missed = np.abs(seen - omega)[:, 50:-50].max(axis=1)
+        assert np.all(missed < 5e-3 * omega.std(axis=1))
+        left = len(log) - np.count_nonzero(np.isfinite(predicted[0]))
+        assert 2 <= left < 0.1 * len(log)
+        inner = slice(left // 2, -(left // 2))  # as much at either end
+        assert np.all(np.isfinite(predicted[:, inner]))
+        off = np.mean((predicted - log.tau)[:, inner] ** 2, axis=1)
+        assert np.all(off < 0.02**2 * np.mean(log.tau**2, axis=1))
 
 
 def test_information_is_added_up_by_second_and_carried_to_the_shared_parameters() -> None:

@@ -79,8 +79,6 @@ def test_blocks_do_not_show_in_the_estimates(name: str, uneven: Log) -> None:
     assert np.all(np.abs(cut - whole) < room)
     assert streamed.log == result.log
     if result.fit is not None and result.fit.residual is not None:
-        assert streamed.fit is not None
-        assert streamed.fit.residual is not None
         # estimates that differ by 1e-7 of their deviations move it by 1e-9 at most
         np.testing.assert_allclose(streamed.fit.residual.rmse, result.fit.residual.rmse, rtol=1e-9)
 

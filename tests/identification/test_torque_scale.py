@@ -18,7 +18,6 @@ import pytest
 from algid.arm import FloatArray, with_payload
 from algid.base.errors import SettingError
 from algid.estimators import refined
-from algid.estimators.problem import Problem
 from algid.identification.identify import identify
 from algid.log import ChannelReading, Log, Origin, Reading
 from algid.notices import Notice
@@ -31,6 +30,7 @@ from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
 from algid.writers import write_log
 from tests.cli.commands import call
+from tests.estimators.conftest import problem_of
 from tests.intervals import distances, holds_95, in_axes
 
 DT = 2e-3
@@ -57,15 +57,10 @@ def currents(*, loaded: bool, seed: int = 0) -> Log:
 def test_a_known_payload_tells_the_gain_of_the_torques() -> None:
     settings = Settings(model="plain", payload_mass=CASE.payload)
     result = identify(currents(loaded=False), currents(loaded=True), settings, report=False)
-    assert result.fit is not None
     gain = result.fit.torque_gain
-    assert gain is not None
-    assert gain.estimate is not None
-    assert gain.std is not None
     assert abs(gain.estimate - CONSTANT) < 4 * gain.std < 0.02 * CONSTANT
     for name, true in zip(("k1", "k4", "k7"), CASE.arm.constants()[[0, 3, 6]], strict=True):
         found = result.parameters[name]
-        assert found.estimate is not None
         assert found.estimate * gain.estimate == pytest.approx(true, rel=0.03)
     l1 = result.payload["l1"]  # no gain changes a length
     assert l1.estimate == pytest.approx(CASE.arm.l1, rel=0.03)
@@ -76,7 +71,6 @@ def test_without_a_payload_there_is_no_gain_to_tell() -> None:
     bare = identify(
         currents(loaded=False), settings=Settings(model="plain", payload_mass=0.5), report=False
     )
-    assert bare.fit is not None
     assert bare.fit.torque_gain is None
     with pytest.raises(SettingError, match="--payload-mass: expected greater than or equal to"):
         Settings(payload_mass=0.0)
@@ -91,23 +85,10 @@ def test_intervals_hold_where_the_second_motor_stands_at_the_base() -> None:
         noise = np.random.default_rng(seed).standard_normal((2, *motion.theta.shape))
         tau = motion.tau + 1e-2 * np.stack([noise[1, 0] + noise[1, 1], noise[1, 1]])
         log = Segment(0.0, DT, motion.theta + 1e-3 * noise[0], tau)
-        fit = refined.fit(Problem([lambda: [log]]))
+        fit = refined.fit(problem_of(log))
         return in_axes(fit.values - k, fit.covariance, fit.quantile)
 
     holds_95(np.array([ratios(seed) for seed in range(100)]))
-
-
-def test_masses_that_no_arm_has_are_asked_about() -> None:
-    """Torques in mN m that nobody labelled make every constant a thousand times too large."""
-    log = currents(loaded=False)
-    for factor, heavy in ((CONSTANT, False), (1e3 * CONSTANT, True)):
-        result = identify(replace(log, tau=factor * log.tau), report=False)
-        asked = [one for one in result.notices if one.key == "OTHER_UNIT:heavy"]
-        assert bool(asked) is heavy
-        for one in asked:
-            assert one.remedies[0].flags == ("--torque-unit", "mN m")
-            assert 200 < one.numbers["mass"] < 350
-            assert result.verdict.grade == "reservations"
 
 
 @cache
@@ -122,13 +103,17 @@ def heavy(result: Result) -> list[Notice]:
 
 
 def test_the_unit_that_is_advised_ends_in_an_answer_as_typed(tmp_path: Path) -> None:
+    """Torques in mN m that nobody labelled make every constant a thousand times too large."""
     file, out = tmp_path / "arm.csv", tmp_path / "arm.algid"
     write_log(file, log_of(1e3))
     words = ["algid", "identify", str(file), "--no-report", "-o", str(tmp_path)]
     with patch.object(sys, "argv", words):  # the result keeps the call
         call(*words[1:])
+    assert read_result(out).verdict.grade == "reservations"
     (asked,) = heavy(read_result(out))
+    assert 200 < asked.numbers["mass"] < 350
     (remedy,) = asked.remedies
+    assert remedy.flags == ("--torque-unit", "mN m")
     done = call(*shlex.split(again(read_result(out), remedy.flags))[1:])
     assert done.code == 0, done.err
     result = read_result(out)

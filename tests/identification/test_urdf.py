@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid.arm import inverse_dynamics
+from algid.arm import FloatArray, inverse_dynamics
 from algid.base.errors import ResultError
 from algid.exports.formats import exported
 from algid.identification.urdf import read_urdf
@@ -53,8 +53,16 @@ def test_what_algid_exports_it_reads(tmp_path: Path) -> None:
         judged.coefficients("loaded")
 
 
-def test_an_arm_from_cad_moves_as_pinocchio_says(tmp_path: Path) -> None:
+def by_pinocchio(text: str, q: FloatArray, omega: FloatArray, alpha: FloatArray) -> FloatArray:
+    """The torque (2, N) of the links of a file, at the joints' configurations (·, N)."""
     pin = pytest.importorskip("pinocchio")
+    robot = pin.buildModelFromXML(text)
+    robot.damping, data = np.zeros(2), robot.createData()
+    moving = zip(q.T, omega.T, alpha.T, strict=True)
+    return np.array([pin.rnea(robot, data, *state) for state in moving]).T
+
+
+def test_an_arm_from_cad_moves_as_pinocchio_says(tmp_path: Path) -> None:
     file = tmp_path / "cad.urdf"
     file.write_text(CAD)
     judged = read_urdf(file)
@@ -62,14 +70,10 @@ def test_an_arm_from_cad_moves_as_pinocchio_says(tmp_path: Path) -> None:
     c = judged.coefficients("unloaded")
     np.testing.assert_array_equal(c[5:], [0.3, 0.2, 0.0, 0.1])
     theta, omega, alpha = states(50)
-    robot = pin.buildModelFromXML(CAD)
-    robot.damping, data = np.zeros(2), robot.createData()
     # of algid's angles, where the file's are zero
     zero = np.array([np.pi / 2 - 1.1, 0.7 - np.pi / 2])
     q = (theta - zero[:, None] + np.pi) % (2 * np.pi) - np.pi
-    found = np.array(
-        [pin.rnea(robot, data, *state) for state in zip(q.T, omega.T, alpha.T, strict=True)]
-    ).T
+    found = by_pinocchio(CAD, q, omega, alpha)
     expected = inverse_dynamics(np.append(c[:5], [0.0, 0.0]), theta, omega, alpha)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
@@ -115,7 +119,6 @@ def test_what_is_no_such_arm_is_refused(old: str, new: str, message: str, tmp_pa
 
 def test_a_centre_beside_its_line_is_taken_over(tmp_path: Path) -> None:
     """Pinocchio computes the same torques from the file."""
-    pin = pytest.importorskip("pinocchio")
     file = tmp_path / "cad.urdf"
     value = values_of(ODD) | {"k1s": 0.02, "k2s": 0.02 * 9.81 / 0.4, "k4s": -1.5}
     text = exported(result_of(value, Model(("phases",))), "arm", "urdf", {"l2": 0.3})[0]
@@ -123,11 +126,7 @@ def test_a_centre_beside_its_line_is_taken_over(tmp_path: Path) -> None:
     judged = read_urdf(file)
     theta, omega, alpha = states(50)
     found = torque(judged.model, judged.coefficients("unloaded"), Motion(theta, omega, alpha))
-    robot = pin.buildModelFromXML(text)
-    data, damping = robot.createData(), np.array(robot.damping)
-    robot.damping = np.zeros(2)
-    for place in range(theta.shape[1]):
-        q = np.stack([np.cos(theta[:, place]), np.sin(theta[:, place])], axis=1).ravel()
-        wanted = pin.rnea(robot, data, q, omega[:, place], alpha[:, place])
-        wanted += damping * omega[:, place]
-        np.testing.assert_allclose(found[:, place], wanted, rtol=0, atol=1e-9 * np.abs(found).max())
+    turned = np.stack([np.cos(theta), np.sin(theta)], axis=1).reshape(4, -1)
+    viscous = np.array([[value["k6"]], [value["k7"]]]) * omega
+    wanted = by_pinocchio(text, turned, omega, alpha) + viscous
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-9 * np.abs(found).max())

@@ -84,7 +84,6 @@ def test_a_hold_out_score_is_that_of_scipys_filters_on_the_true_motion(
     k = K * (1 + 0.1 * np.array([1, -1, 1, 1, -1, 1, -1])) if wrong else K
     log = logged(motions[0], 1)
     found = validate(known(k), survey((log, "unloaded"))).logs["log1"]
-    assert found is not None
     Y, tau = columns(motions[0]), low(log.tau)
     residual = tau - np.einsum("p,pjn->jn", k, Y)
     rms = np.sqrt(np.mean(residual**2, axis=1))
@@ -103,10 +102,7 @@ def test_a_torque_that_acts_late_is_predicted_where_it_acts(motions: list[Simula
     right, wrong = (
         validate(known(K, shift), survey((early, "unloaded"))).total for shift in (6 * DT, 0.0)
     )
-    assert right is not None
-    assert wrong is not None
     exact = validate(known(K), survey((logged(motions[0], 1), "unloaded"))).total
-    assert exact is not None
     np.testing.assert_allclose(right.rmse, exact.rmse, rtol=0.05)
     assert wrong.rmse[0] > 5 * right.rmse[0]
 
@@ -120,8 +116,6 @@ def test_cross_validation_is_the_prediction_of_each_log_by_a_fit_of_the_others(
     logs = [logged(motion, seed) for seed, motion in enumerate(motions)]
     settings = Settings(estimator="weak", model="plain", cross_validate=True)
     result = identify(logs, None, settings, report=False)
-    assert result.fit is not None
-    assert result.fit.cross_validation is not None
     Y, tau = [columns(motion) for motion in motions], [low(log.tau) for log in logs]
     squares, count = np.zeros(2), 0
     for out in range(3):
@@ -132,7 +126,6 @@ def test_cross_validation_is_the_prediction_of_each_log_by_a_fit_of_the_others(
         left = tau[out] - np.einsum("p,pjn->jn", k, Y[out])
         squares, count = squares + np.sum(left**2, axis=1), count + left.shape[1]
     np.testing.assert_allclose(result.fit.cross_validation.rmse, np.sqrt(squares / count), rtol=0.1)
-    assert result.fit.residual is not None
     assert np.all(np.array(result.fit.cross_validation.rmse) > np.array(result.fit.residual.rmse))
 
 
@@ -151,10 +144,8 @@ def test_a_result_predicts_logs_of_both_roles(
     found = validate(predictor_of(weighed, "r"), fresh)
     for name in ("log11", "log12"):
         one = found.logs[name]
-        assert one is not None
         # little beyond the torque's own noise below 5 Hz, σ √(2 · 5 Hz · dt) and the filter's slope
         assert np.all(np.array(one.rmse) < 1.5 * SIGMA * np.sqrt(2 * 5.0 * DT))
     swapped = survey((logged(motions[1], 11), "loaded"))
     bad = validate(predictor_of(weighed, "r"), swapped).total
-    assert bad is not None
     assert bad.rmse[0] > 3 * SIGMA

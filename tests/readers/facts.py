@@ -24,9 +24,7 @@ import numpy as np
 import pandas as pd
 import polars as pl
 import pyarrow as pa
-import pyarrow.feather as feather
 import pyarrow.parquet as parquet
-import scipy.io
 import zstandard
 from numpy.typing import NDArray
 
@@ -34,6 +32,7 @@ import algid
 from algid.arm import FloatArray
 from algid.base.ros2 import JOINT_STATE_DEFINITION
 from algid.base.units import TORQUE
+from tests.readers.mcaps import ANY, Schema
 from tests.readers.ways import (
     EPOCH,
     FLAT,
@@ -47,6 +46,9 @@ from tests.readers.ways import (
     arrow_table,
     csv_text,
     json_mcap,
+    store,
+    store_table,
+    units,
     written,
 )
 
@@ -163,12 +165,6 @@ def either(first: Any, one: list[Message], other: list[Message]) -> list[Message
     return [a if of_one else b for of_one, a, b in zip(first, one, other, strict=True)]
 
 
-def units(columns: Columns, names: str) -> Flat:
-    """Columns whose units stand beside them: attributes, or a row of units."""
-    pairs = zip(columns, names.split(","), strict=True)
-    return Flat(columns, {key: {"units": unit} for key, unit in pairs})
-
-
 def defined(sent: list[Message], position: str = "", effort: str = "") -> States:
     """Messages whose definition has comments behind two fields."""
     text = JOINT_STATE_DEFINITION.replace("float64[] position", f"float64[] position{position}")
@@ -266,7 +262,7 @@ def named_matrix(way: str, folder: Path) -> Any:
             stated = {"joint_names": json.dumps(names)}
             table = pa.table({"time": T, "q": list(q), "tau": list(tau)})
             fields = [one.with_metadata({"names": json.dumps(names)}) for one in table.schema]
-            _write_table(way, table.cast(pa.schema(fields, metadata=stated)), path)
+            store_table(path, table.cast(pa.schema(fields, metadata=stated)))
         case "npz" | "mat" | "dict":
             said = np.array(names, object if way == "mat" else None)
             return _arrays(way, folder, {**content, "joint_names": said})
@@ -289,13 +285,8 @@ def _by_row(columns: Mapping[str, Any]) -> Any:
     return zip(*(list(values) for values in columns.values()), strict=True)
 
 
-def _objects(folder: Path, objects: list[dict[str, Any]], schema: Any = None) -> Path:
-    rows = [(int(NS[row]), json.dumps(one).encode()) for row, one in enumerate(objects)]
-    return json_mcap(folder, rows, json.dumps(schema or {"type": "object"}).encode())
-
-
-def _write_table(way: str, table: pa.Table, path: Path) -> None:
-    (parquet.write_table if way == "parquet" else feather.write_feather)(table, path)
+def _objects(folder: Path, objects: list[dict[str, Any]], schema: Schema = ANY) -> Path:
+    return json_mcap(folder, zip(NS.tolist(), map(json.dumps, objects), strict=True), schema)
 
 
 def json_schema_unit(way: str, folder: Path) -> Path:
@@ -305,7 +296,8 @@ def json_schema_unit(way: str, folder: Path) -> Path:
     kinds = {name: torque if name[:3] == "tau" else {"type": "number"} for name in base()}
     columns = {name: v.tolist() for name, v in base(tau=MNM).items() if name != "time"}
     objects = [dict(zip(columns, row, strict=True)) for row in _by_row(columns)]
-    return _objects(folder, objects, {"type": "object", "properties": kinds})
+    schema = json.dumps({"type": "object", "properties": kinds}).encode()
+    return _objects(folder, objects, ("arm", "jsonschema", schema))
 
 
 def indexed(index: Any) -> Written:
@@ -319,7 +311,7 @@ def indexed(index: Any) -> Written:
         if way == "csv":
             frame.to_csv(path)
         elif way in ("parquet", "feather"):
-            _write_table(way, pa.Table.from_pandas(frame), path)
+            store_table(path, pa.Table.from_pandas(frame))
         else:
             raise CannotSayError
         return path
@@ -329,28 +321,11 @@ def indexed(index: Any) -> Written:
 
 def _arrays(way: str, folder: Path, content: dict[str, Any]) -> Any:
     """Arrays of any length, those named with a dot in groups."""
-    path = folder / f"log.{way}"
-    match way:
-        case "h5":
-            with h5py.File(path, "w") as file:
-                for name, values in content.items():
-                    file[name.replace(".", "/")] = values
-        case "mat":
-            structs: dict[str, Any] = {}
-            for name, values in content.items():
-                group, dot, own = name.partition(".")
-                if dot:
-                    structs.setdefault(group, {})[own] = values
-                else:
-                    structs[name] = values
-            scipy.io.savemat(path, structs)
-        case "npz":
-            np.savez(path, **content)
-        case "dict":
-            return content
-        case _:
-            raise CannotSayError
-    return path
+    if way == "dict":
+        return content
+    if way not in ("h5", "mat", "npz"):
+        raise CannotSayError
+    return store(folder / f"log.{way}", content)
 
 
 def groups(way: str, folder: Path) -> Any:
@@ -387,10 +362,7 @@ def column_twice(way: str, folder: Path) -> Any:
 
     match way:
         case "json":
-            return json_mcap(
-                folder,
-                [(stamp, text.encode()) for stamp, text in zip(NS.tolist(), texts, strict=True)],
-            )
+            return json_mcap(folder, zip(NS.tolist(), texts, strict=True))
         case "jsonl":
             path.write_text("\n".join(texts) + "\n")
         case "parquet":

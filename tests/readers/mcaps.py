@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -66,30 +66,39 @@ def joint_state(
     return message.list("d", position).list("d", velocity).list("d", effort)
 
 
+Schema = tuple[str, str, bytes]
+"""Name, encoding and data."""
+STATE: Schema = JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode()
+ANY: Schema = "any", "jsonschema", b'{"type":"object"}'
+
+
 def write_mcap(
     path: Path,
     messages: Iterable[tuple[str, int, bytes]],
-    schemas: dict[str, tuple[str, str, bytes]] | None = None,
+    schemas: Mapping[str, Schema] | Schema = STATE,
     *,
-    encoding: str = "cdr",
+    metadata: Mapping[str, str] | None = None,
     compression: CompressionType = CompressionType.ZSTD,
     chunk_size: int = 4096,
     **options: Any,
-) -> None:
-    """Write messages (topic, log time, bytes); `schemas` gives name, encoding and data by topic."""
+) -> Path:
+    """Write messages (topic, log time, bytes) of one schema, or of those by topic, else `STATE`."""
+    said = dict(metadata or {})
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=chunk_size, compression=compression, **options)
         writer.start(profile="ros2")
         channels: dict[str, int] = {}
         for topic, stamp, data in messages:
             if topic not in channels:
-                name, kind, text = (schemas or {}).get(
-                    topic, (JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
-                )
-                schema = writer.register_schema(name, kind, text)
-                channels[topic] = writer.register_channel(topic, encoding, schema)
+                own = schemas if isinstance(schemas, tuple) else schemas.get(topic, STATE)
+                encoding = {"jsonschema": "json", "protobuf": "protobuf"}.get(own[1], "cdr")
+                schema = writer.register_schema(*own)
+                channels[topic] = writer.register_channel(topic, encoding, schema, said)
             writer.add_message(channels[topic], stamp, data, stamp)
+        if said:
+            writer.add_metadata("log", said)
         writer.finish()  # type: ignore[no-untyped-call]
+    return path
 
 
 NO_INDEX: dict[str, Any] = {
@@ -155,5 +164,4 @@ def chunks_of(path: Path) -> list[Any]:
     """The chunk indexes of a file as the `mcap` package reads them."""
     with path.open("rb") as stream:
         summary = make_reader(stream).get_summary()
-    assert summary is not None
     return list(summary.chunk_indexes)

@@ -20,7 +20,7 @@ from algid.readers import read_log
 from algid.readers.bags import open_bag
 from tests.readers.large import write_db3
 from tests.readers.logs import EPOCH_NS, noise_log, same
-from tests.readers.ways import STORES, Message, States, fill, sent, written
+from tests.readers.ways import STORES, Message, States, bag1, sent, written
 
 LOG = noise_log(200, start_ns=EPOCH_NS)
 PLACES = ("theta1", "theta2", "tau1", "tau2")
@@ -35,32 +35,6 @@ def taken(*sources: str, **more: Any) -> Profile:
     """Settings that name each channel's field."""
     named = {name: {"source": own} for name, own in zip(PLACES, sources, strict=True)}
     return Profile.model_validate(named | more)
-
-
-def test_topic_and_source_of_a_profile_are_honoured(tmp_path: Path) -> None:
-    path = bag(tmp_path, *sent(LOG, topic="/one"), *sent(LOG, topic="/two"))
-    assert read_log(path, Profile(topic="/two")).origin.reading.topics == ("/two",)
-    crossed = Profile.model_validate(
-        {
-            "topic": "/one",
-            "tau1": {"source": "effort[j2]"},
-            "tau2": {"topic": "/two", "source": "effort[0]"},
-        }
-    )
-    found = read_log(path, crossed)
-    assert found.tau.tolist() == LOG.tau[::-1].tolist()
-    assert found.origin.mapping["tau2"] == "/two: effort[0]"
-    assert found.origin.reading.topics == ("/one", "/two")
-    recorded = read_log(path, Profile(topic="/one", clock="log"))
-    assert recorded.origin.mapping["t"] == "log time"
-    with pytest.raises(
-        LogError, match=r"joints foo, bar; joints there are: j1, j2; choose two: --joints A,B"
-    ):
-        read_log(path, Profile(joints=("foo", "bar")))
-    with pytest.raises(LogError, match="no topic holds"):
-        read_log(path, Profile(topic="/three"))
-    with pytest.raises(LogError, match=r"joint states on /one, /two; choose: --topic NAME"):
-        read_log(path)
 
 
 def described(folder: Path, names: list[str], more: str = "") -> Path:
@@ -130,40 +104,12 @@ def state(row: int, **changes: Any) -> Message:
     return replace(pair, **changes)
 
 
-def test_joints_come_along_the_arm_and_messages_without_them_are_counted(tmp_path: Path) -> None:
-    path = bag(
-        tmp_path,
-        state(0),
-        state(1, name=["c"], position=[9], effort=[9]),
-        state(2),
-        state(3, name=(), position=(), effort=()),
-        state(4),
-    )
-    log = read_log(path)
-    assert log.theta.tolist() == [[2] * 3, [1] * 3]
-    assert log.tau.tolist() == [[20] * 3, [10] * 3]
-    assert log.omega is None
-    assert log.stamp_ns.tolist() == [5 * 10**9 + row * 1_000_000 for row in (0, 2, 4)]
-    assert (log.origin.reading.joints, log.origin.reading.joints_told) == (("a", "b"), "names")
-    assert [notice.text for notice in log.notices if notice.code == "MESSAGES_LEFT_OUT"] == [
-        "2 messages on '/joint_states' left out: of other joints"
-    ]
-    # the recorder's own times, where a user asks for them
-    assert read_log(path, Profile(clock="log")).stamp_ns.tolist() == [
-        10**9 + row for row in (0, 2, 4)
-    ]
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
         (
             {"effort": []},
             r"found '/joint_states' with .*position\[b\], position\[a\], .*effort \(empty\); name",
-        ),
-        (
-            {"name": ["a", "a"]},
-            "'/joint_states': its messages name the joint 'a' twice; .*name each field",
         ),
         (
             {"position": [1]},
@@ -201,17 +147,6 @@ def test_a_field_needs_a_topic_and_a_topic_its_field(tmp_path: Path) -> None:
             read_log(path, Profile.model_validate({"tau2": {"source": wrong}}))
 
 
-def ros1(path: Path, packing: Writer.CompressionFormat | None = None) -> bytes:
-    """The log as a ROS 1 bag of small chunks."""
-    writer = Writer(path)
-    writer.chunk_threshold = 4096
-    if packing is not None:
-        writer.set_compression(packing)
-    with writer:
-        fill(writer, STORES[0], States(sent(LOG)), {"seq": 0})
-    return path.read_bytes()
-
-
 def poked(content: bytes, place: int, form: str, value: int) -> bytes:
     changed = bytearray(content)
     struct.pack_into(form, changed, place, value)
@@ -226,9 +161,9 @@ def lossy(log: Log) -> tuple[str, str]:
 
 
 def test_a_bag_without_its_index_is_refused_with_its_mend(tmp_path: Path) -> None:
-    path = tmp_path / "a.bag"
-    content = ros1(path)
-    mend = r"rosbag reindex a\.bag may mend it"
+    path = bag1(tmp_path, States(sent(LOG)))
+    content = path.read_bytes()
+    mend = r"rosbag reindex log\.bag may mend it"
     for share in (0.2, 0.9, 0.999):
         path.write_bytes(content[: round(share * len(content))])
         with pytest.raises(LogError, match=rf"can be read \(.+\); {mend}"):
@@ -240,8 +175,8 @@ def test_a_bag_without_its_index_is_refused_with_its_mend(tmp_path: Path) -> Non
 
 
 def test_an_index_that_lists_fewer_messages_than_it_counts_is_told(tmp_path: Path) -> None:
-    path = tmp_path / "a.bag"
-    content = ros1(path)
+    path = bag1(tmp_path, States(sent(LOG)))
+    content = path.read_bytes()
     chunk = content.index(b"count=", content.rindex(b"op=\x04")) + 6  # of the last chunk's index
     (count,) = struct.unpack_from("<I", content, chunk)
     pairs = content.rindex(struct.pack("<II", 0, count))  # of what is told of the last chunk
@@ -252,8 +187,8 @@ def test_an_index_that_lists_fewer_messages_than_it_counts_is_told(tmp_path: Pat
 
 
 def test_a_bag_is_read_up_to_its_first_damaged_chunk(tmp_path: Path) -> None:
-    path = tmp_path / "a.bag"
-    content = ros1(path, Writer.CompressionFormat.LZ4)
+    path = bag1(tmp_path, States(sent(LOG)), Writer.CompressionFormat.LZ4)
+    content = path.read_bytes()
     third = [place for place in range(len(content)) if content.startswith(b"op=\x05", place)][2]
     place = content.index(b"\x04\x22\x4d\x18", third)  # an LZ4 frame
     path.write_bytes(content[: place + 40] + bytes(60) + content[place + 100 :])

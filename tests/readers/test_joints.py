@@ -69,17 +69,6 @@ def told(log: Log) -> list[str]:
     return [one.clause for one in log.notices if one.code == "JOINT_ORDER"]
 
 
-def test_joint_states_in_alphabetical_order_are_put_along_the_arm(tmp_path: Path) -> None:
-    log = read_log(states(tmp_path, "elbow", "shoulder"))
-    assert log.theta[1].tolist() == [1.0] * 10
-    assert log.tau[:, 0].tolist() == [20, 10]
-    assert log.origin.mapping["theta1"] == "/joint_states: position[shoulder]"
-    reading = log.origin.reading
-    assert (reading.joints, reading.joints_told) == (("shoulder", "elbow"), "names")
-    (text,) = told(log)
-    assert "--joints elbow,shoulder" in text
-
-
 def test_joints_whose_names_do_not_tell_stay_and_are_told(tmp_path: Path) -> None:
     path = states(tmp_path, "left", "right")
     log = read_log(path)

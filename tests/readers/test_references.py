@@ -73,7 +73,6 @@ def read(columns: Columns, **settings: Any) -> Log:
 
 
 def reference(log: Log) -> FloatArray:
-    assert log.reference is not None
     return log.reference
 
 

@@ -7,7 +7,6 @@ missing, damaged, cut off, of another format, or changed since algid wrote it.
 
 from __future__ import annotations
 
-import json
 import re
 import tomllib
 from collections.abc import Callable
@@ -25,7 +24,7 @@ from algid.readers import read_log
 from algid.writers import write_log
 from tests.inspection.test_checks import moving_log, noticed, spoiled
 from tests.readers.logs import EPOCH_NS
-from tests.readers.mcaps import joint_state, write_mcap
+from tests.readers.ways import Message, States, written
 
 FLAGS = {
     "--joints": "joints",
@@ -87,27 +86,22 @@ def continuous(folder: Path) -> Path:
     return folder / "log.parquet"
 
 
-def moved(values: list[float], stamp: int) -> list[float]:
-    return [one + np.sin(stamp) for one in values]
-
-
 def states(topics: tuple[str, ...], names: tuple[str, ...]) -> Callable[[Path], Path]:
     def make(folder: Path) -> Path:
-        stamps = [EPOCH_NS + step * 1_000_000 for step in range(ROWS)]
-        values = [0.1 * place for place in range(len(names))]
-        messages = [
-            (
-                topic,
-                stamp,
-                joint_state(stamp, names, moved(values, stamp), [], moved(values, stamp)).done(),
-            )
-            for stamp in stamps
-            for topic in topics
-        ]
-        write_mcap(folder / "log.mcap", messages)
-        return folder / "log.mcap"
+        found = []
+        for stamp in range(EPOCH_NS, EPOCH_NS + ROWS * 1_000_000, 1_000_000):
+            values = [0.1 * place + np.sin(stamp) for place in range(len(names))]
+            found += [Message(values, values, stamp, stamp, names, topic=topic) for topic in topics]
+        return Path(written("cdr", folder, States(found)))
 
     return make
+
+
+def no_stamps(folder: Path) -> Path:
+    """JSON joint states whose headers are beyond every date."""
+    rows = enumerate(np.sin(np.arange(ROWS)))
+    found = [Message((q, 1 + q), (q, 1 - q), 10**309, row * 1_000_000) for row, q in rows]
+    return Path(written("json", folder, States(found)))
 
 
 def accepted(code: str) -> Refusal:
@@ -169,6 +163,7 @@ REFUSALS = {
     "a value that is no number": Refusal(
         with_nan(), "finite number", "--accept NOT_FINITE", "NOT_FINITE"
     ),
+    "header stamps that are none": Refusal(no_stamps, "header stamp with", "--set clock=log"),
     "two topics": Refusal(states(("/one", "/two"), ("j1", "j2")), "/one, /two", "--topic /two"),
     "three joints of a topic": Refusal(
         states(("/one",), ("j1", "j2", "j3")), "3 joints", "--joints j1,j3"
@@ -206,7 +201,6 @@ def test_each_refusal_yields_to_the_flag_it_names(name: str, tmp_path: Path) -> 
             noticed(read_log(path))
         assert refusal.words in str(refused.value)
         first = re.match(r"--[\w-]+ [\w./]+", refusal.flags)
-        assert first is not None
         named = first[0].rpartition(" ")[0] if "--set" not in refusal.flags else first[0]
         assert named in str(refused.value)
         assert flag_first(str(refused.value)), refused.value
@@ -216,33 +210,6 @@ def test_each_refusal_yields_to_the_flag_it_names(name: str, tmp_path: Path) -> 
     if refusal.warning:
         assert refusal.warning in [notice.code for notice in seen]
 
-
-def flat(seconds: float) -> Callable[[Path], Path]:
-    """JSON joint states whose headers' seconds are these."""
-
-    def make(folder: Path) -> Path:
-        messages = []
-        for step in range(ROWS):
-            values = moved([0.1, 0.2], step)
-            stamp = {"sec": seconds, "nanosec": step}
-            text = {
-                "header": {"stamp": stamp},
-                "name": ["j1", "j2"],
-                "position": values,
-                "effort": values,
-            }
-            messages.append(("/arm", EPOCH_NS + step * 1_000_000, json.dumps(text).encode()))
-        write_mcap(
-            folder / "log.mcap", messages, {"/arm": ("arm", "jsonschema", b"{}")}, encoding="json"
-        )
-        return folder / "log.mcap"
-
-    return make
-
-
-REFUSALS["header stamps that are none"] = Refusal(
-    flat(1e300), "header stamp with", "--set clock=log"
-)
 
 TAKEN = {"source": "position[a]", "topic": "/other"}
 WRONG: dict[str, tuple[Callable[[Path], Path], dict[str, Any], str]] = {

@@ -31,26 +31,16 @@ from tests.readers.mcaps import (
     protobuf_types,
     write_mcap,
 )
-from tests.readers.ways import States, json_mcap, sent, written
+from tests.readers.ways import States, json_mcap, json_state, sent, written
 
 LOG = noise_log(200, start_ns=EPOCH_NS, velocity=False)
 
 
 def changed_json(folder: Path, row: int, change: Callable[[Any], object]) -> Path:
     """The log as JSON joint states, one of them changed."""
-    rows = []
-    for place, one in enumerate(sent(LOG)):
-        sec, nanosec = divmod(one.stamp, 10**9)
-        content = {
-            "header": {"stamp": {"sec": sec, "nanosec": nanosec}},
-            "name": one.name,
-            "position": one.position,
-            "effort": one.effort,
-        }
-        if place == row:
-            change(content)
-        rows.append((one.stamp, json.dumps(content).encode()))
-    return json_mcap(folder, rows)
+    objects = [json_state(one) for one in sent(LOG)]
+    change(objects[row])
+    return json_mcap(folder, zip(LOG.stamp_ns.tolist(), map(json.dumps, objects), strict=True))
 
 
 @pytest.mark.parametrize("digits", [20, 400])
@@ -245,7 +235,7 @@ def test_a_protobuf_number_that_is_unset_is_no_zero(presence: str, tmp_path: Pat
         messages.append((TOPIC, row * 10**6, made(**values).SerializeToString()))
     path = tmp_path / "log.mcap"
     known = {TOPIC: ("arm.State", "protobuf", schema)}
-    write_mcap(path, messages, known, encoding="protobuf")
+    write_mcap(path, messages, known)
     source = "{}.value" if presence == "message" else "{}"
     log = read_log(path, named(" ".join(map(source.format, ARM)), clock="log"))
     lost = [
@@ -260,31 +250,20 @@ def test_a_protobuf_number_that_is_unset_is_no_zero(presence: str, tmp_path: Pat
         assert lost == [f"20 messages on '{TOPIC}' left out for want of {source.format('tau2')}"]
 
 
-@pytest.mark.parametrize("encoding", ["cdr", "protobuf"])
 @pytest.mark.parametrize(("flag", "bad"), [("valid", 0), ("error_code", 17)])
 def test_messages_that_a_flag_calls_no_measurement_are_left_out(
-    encoding: str, flag: str, bad: int, tmp_path: Path
+    flag: str, bad: int, tmp_path: Path
 ) -> None:
     wild = range(50, 60)
     definition = b"float64[2] q\nfloat64[2] tau\nuint8 other\nbool valid\nint32 error_code\n"
-    known: tuple[str, str, bytes] = ("arm_msgs/msg/State", "ros2msg", definition)
-    schema, made = protobuf_types(
-        protobuf_file(
-            ("q", 1, 3), ("tau", 1, 3), ("other", 13, 1), ("valid", 8, 1), ("error_code", 5, 1)
-        )
-    )
-    if encoding == "protobuf":
-        known = ("arm.State", "protobuf", schema)
     messages = []
     for row, one in enumerate(sent(LOG)):
         says = {"valid": 1, "error_code": 0} | ({flag: bad} if row in wild else {})
         q = np.array(one.position) + (row in wild)
         content = struct.pack("<4B4dBB2xi", 0, 1, 0, 0, *q, *one.effort, row % 256, *says.values())
-        if encoding == "protobuf":
-            content = made(q=q, tau=one.effort, other=row, **says).SerializeToString()
         messages.append((TOPIC, one.stamp, content))
-    path = tmp_path / "log.mcap"
-    write_mcap(path, messages, {TOPIC: known}, encoding=encoding)
+    known = ("arm_msgs/msg/State", "ros2msg", definition)
+    path = write_mcap(tmp_path / "log.mcap", messages, known)
     found = read_log(path, named("q[0] q[1] tau[0] tau[1]"))
     kept = np.delete(np.arange(200), wild)
     np.testing.assert_array_equal(found.theta, LOG.theta[:, kept])

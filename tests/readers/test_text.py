@@ -189,7 +189,6 @@ def test_columns_of_a_table_without_a_header_are_named(tmp_path: Path) -> None:
     np.savetxt(path, np.column_stack([log.t, log.theta.T, log.tau.T]), delimiter=",")
     seen = algid.inspect(path)
     assert [one.name for one in seen.entries] == [f"column {n}" for n in range(1, 6)]
-    assert seen.refused is not None
     assert "no column for t, theta1, theta2, tau1, tau2; found 'column 1', 'co" in seen.refused
     assert """as --set 'columns=["t", "theta1", "theta2", "tau1", "tau2"]'""" in seen.refused
     assert algid.inspect(path, columns=HEAD).refused is None

@@ -170,5 +170,4 @@ def test_an_earlier_result_lends_no_other_log_its_torques(tmp_path: Path) -> Non
         algid.identify(unloaded, model="plain").parameters["k1"].estimate
     )
     weighed = algid.identify([], loaded, parameters=arm)
-    assert weighed.logs[0].reading is not None
     assert weighed.logs[0].reading.torque_file is None

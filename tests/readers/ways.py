@@ -6,8 +6,9 @@ import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import h5py
 import numpy as np
@@ -17,7 +18,6 @@ import pyarrow as pa
 import pyarrow.feather as feather
 import pyarrow.parquet as parquet
 import scipy.io
-from mcap.writer import Writer
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
@@ -25,7 +25,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log
-from tests.readers.mcaps import joint_state, protobuf_schema
+from tests.readers.mcaps import ANY, Schema, joint_state, protobuf_schema, write_mcap
 
 EPOCH = 1_700_000_000_000_000_000
 FLAT = [
@@ -39,7 +39,6 @@ _WITH_ATTRIBUTES = {"csv", "tsv", "parquet", "feather", "npz", "mat", "h5", "pan
 _MASKED = {"parquet", "feather", "dict", "pandas", "polars", "arrays"}
 _ZONED = {"csv", "tsv", "jsonl", "parquet", "feather", "pandas", "polars"}
 CANONICAL = ["time", "q1", "q2", "tau1", "tau2"]
-_JSON_SCHEMA = b'{"type":"object"}'
 STORES = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 
 
@@ -61,6 +60,12 @@ class Flat:
     columns: Mapping[str, Any]
     attributes: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     metadata: Mapping[str, str] = field(default_factory=dict)
+
+
+def units(columns: Mapping[str, Any], names: str, key: str = "units") -> Flat:
+    """Columns whose units stand beside them: attributes, or a row of units."""
+    pairs = zip(columns, names.split(","), strict=True)
+    return Flat(columns, {name: {key: unit} for name, unit in pairs})
 
 
 @dataclass(frozen=True)
@@ -170,15 +175,9 @@ def csv_text(log: Flat, separator: str = ",") -> str:
     return "\n".join(lines) + "\n"
 
 
-def _csv(folder: Path, log: Flat) -> Path:
-    path = folder / "log.csv"
-    path.write_text(csv_text(log))
-    return path
-
-
-def _tsv(folder: Path, log: Flat) -> Path:
-    path = folder / "log.tsv"
-    path.write_text(csv_text(log, "\t"))
+def _text(way: str, folder: Path, log: Flat) -> Path:
+    path = folder / f"log.{way}"
+    path.write_text(csv_text(log, "," if way == "csv" else "\t"))
     return path
 
 
@@ -211,29 +210,49 @@ def arrow_table(log: Flat) -> pa.Table:
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=log.metadata or None))
 
 
-def _parquet(folder: Path, log: Flat) -> Path:
-    path = folder / "log.parquet"
-    parquet.write_table(arrow_table(log), path)
+def store_table(path: Path, table: pa.Table, **options: Any) -> Path:
+    """A table as Parquet or Feather."""
+    if path.suffix == ".parquet":
+        parquet.write_table(table, path, **options)
+    else:
+        feather.write_feather(table, str(path), **options)
     return path
 
 
-def _feather(folder: Path, log: Flat) -> Path:
-    path = folder / "log.feather"
-    feather.write_feather(arrow_table(log), path)
+def store(path: Path, arrays: Mapping[str, Any], packed: bool = False) -> Path:
+    """Arrays for NumPy, MATLAB or HDF5; those named with dots lie in structures or groups."""
+    if path.suffix == ".npz":
+        (np.savez_compressed if packed else np.savez)(path, **arrays)
+    elif path.suffix == ".mat":
+        structs: dict[str, Any] = {}
+        for name, values in arrays.items():
+            *groups, own = name.split(".")
+            level = structs
+            for group in groups:
+                level = level.setdefault(group, {})
+            level[own] = values
+        scipy.io.savemat(path, structs, do_compression=packed)
+    else:
+        with h5py.File(path, "w") as file:
+            packing = {"compression": "gzip", "chunks": True} if packed else {}
+            for name, values in arrays.items():
+                file.create_dataset(name.replace(".", "/"), data=values, **packing)
     return path
+
+
+def _table(way: str, folder: Path, log: Flat) -> Path:
+    return store_table(folder / f"log.{way}", arrow_table(log))
 
 
 def _npz(folder: Path, log: Flat) -> Path:
     if "O" in _kinds(log):
         raise CannotSayError
-    path = folder / "log.npz"
     arrays = {name: np.asarray(values) for name, values in log.columns.items()}
     arrays |= {key: np.array(value) for key, value in log.metadata.items()}
     for key in {key for said in log.attributes.values() for key in said}:
         by_place = [log.attributes.get(name, {}).get(key, "") for name in log.columns]
         arrays[key] = np.array(by_place)
-    np.savez(path, **arrays)  # type: ignore[arg-type]
-    return path
+    return store(folder / "log.npz", arrays)
 
 
 def _mat(folder: Path, log: Flat) -> Path:
@@ -244,22 +263,19 @@ def _mat(folder: Path, log: Flat) -> Path:
     for key in {key for said in log.attributes.values() for key in said}:
         by_name = {name: said[key] for name, said in log.attributes.items() if key in said}
         content[key] = by_name
-    path = folder / "log.mat"
-    scipy.io.savemat(path, content)
-    return path
+    return store(folder / "log.mat", content)
 
 
 def _h5(folder: Path, log: Flat) -> Path:
     if _kinds(log) & set("OmM"):
         raise CannotSayError
-    path = folder / "log.h5"
-    with h5py.File(path, "w") as file:
-        for name, values in log.columns.items():
-            array = np.asarray(values)
-            stored = array.astype("S") if array.dtype.kind == "U" else array
-            data = file.create_dataset(name.replace("/", "_"), data=stored)
-            for key, text in log.attributes.get(name, {}).items():
-                data.attrs[key] = text if key == "units" else float(text)
+    arrays = {name: np.asarray(values) for name, values in log.columns.items()}
+    texts = {name: one.astype("S") for name, one in arrays.items() if one.dtype.kind == "U"}
+    path = store(folder / "log.h5", arrays | texts)
+    with h5py.File(path, "a") as file:
+        for name, said in log.attributes.items():
+            for key, text in said.items():
+                file[name].attrs[key] = text if key == "units" else float(text)
         file.attrs.update(log.metadata)
     return path
 
@@ -321,49 +337,24 @@ def _json_columns(folder: Path, log: Flat) -> Path:
     rows = []
     for place, row in enumerate(_rows(log)):
         text = json.dumps(dict(zip(log.columns, map(_json_value, row), strict=True)))
-        rows.append((place * 5_000_000, text.encode()))
+        rows.append((place * 5_000_000, text))
     return json_mcap(folder, rows)
 
 
-_FLAT_WAYS = {
-    "csv": _csv, "tsv": _tsv, "jsonl": _jsonl, "parquet": _parquet, "feather": _feather,
+_FLAT_WAYS: dict[str, Callable[[Path, Flat], Any]] = {
+    "csv": partial(_text, "csv"), "tsv": partial(_text, "tsv"), "jsonl": _jsonl,
+    "parquet": partial(_table, "parquet"), "feather": partial(_table, "feather"),
     "npz": _npz, "mat": _mat, "h5": _h5, "dict": _dict, "pandas": _pandas,
     "polars": _polars, "arrays": _arrays, "json": _json_columns,
 }  # fmt: skip
 
 
 def json_mcap(
-    folder: Path,
-    rows: Sequence[tuple[int, bytes]],
-    schema: bytes = _JSON_SCHEMA,
-    metadata: Mapping[str, str] | None = None,
+    folder: Path, rows: Iterable[tuple[int, str]], schema: Schema = ANY, topic: str = "/arm"
 ) -> Path:
     """Objects on one topic with their log times in ns."""
-    topics = [("/arm", stamp, data) for stamp, data in rows]
-    return _mcap(folder, topics, ("arm", "jsonschema", schema), "json", metadata or {})
-
-
-def _mcap(
-    folder: Path,
-    rows: Sequence[tuple[str, int, bytes]],
-    schema: tuple[str, str, bytes],
-    encoding: str,
-    metadata: Mapping[str, str],
-) -> Path:
-    path = folder / "log.mcap"
-    with path.open("wb") as stream:
-        writer = Writer(stream)
-        writer.start(profile="ros2")
-        number = writer.register_schema(*schema)
-        channels: dict[str, int] = {}
-        for topic, stamp, data in rows:
-            if topic not in channels:
-                channels[topic] = writer.register_channel(topic, encoding, number, dict(metadata))
-            writer.add_message(channels[topic], stamp, data, stamp)
-        if metadata:
-            writer.add_metadata("log", dict(metadata))
-        writer.finish()  # type: ignore[no-untyped-call]
-    return path
+    messages = ((topic, stamp, text.encode()) for stamp, text in rows)
+    return write_mcap(folder / "log.mcap", messages, schema)
 
 
 def _cdr(folder: Path, log: States) -> Path:
@@ -374,7 +365,19 @@ def _cdr(folder: Path, log: States) -> Path:
         )
         rows.append((one.topic, one.log_stamp, message.done()))
     schema = (JOINT_STATE, "ros2msg", log.definition.encode())
-    return _mcap(folder, rows, schema, "cdr", log.metadata)
+    return write_mcap(folder / "log.mcap", rows, schema, metadata=log.metadata)
+
+
+def json_state(one: Message) -> dict[str, Any]:
+    """A joint state as the object that JSON has of it."""
+    sec, nanosec = divmod(one.stamp, 10**9)
+    return {
+        "header": {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": one.frame},
+        "name": one.name,
+        "position": one.position,
+        "effort": one.effort,
+        "velocity": one.velocity,
+    }
 
 
 def _usual_definition(log: States) -> None:
@@ -384,19 +387,10 @@ def _usual_definition(log: States) -> None:
 
 def _json(folder: Path, log: States) -> Path:
     _usual_definition(log)
-    rows = []
-    for one in log.messages:
-        sec, nanosec = divmod(one.stamp, 10**9)
-        header = {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": one.frame}
-        content = {
-            "header": header,
-            "name": one.name,
-            "position": one.position,
-            "effort": one.effort,
-            "velocity": one.velocity,
-        }
-        rows.append((one.topic, one.log_stamp, json.dumps(content).encode()))
-    return _mcap(folder, rows, ("arm", "jsonschema", _JSON_SCHEMA), "json", log.metadata)
+    rows = [
+        (one.topic, one.log_stamp, json.dumps(json_state(one)).encode()) for one in log.messages
+    ]
+    return write_mcap(folder / "log.mcap", rows, ANY, metadata=log.metadata)
 
 
 def _pb(folder: Path, log: States) -> Path:
@@ -411,7 +405,8 @@ def _pb(folder: Path, log: States) -> Path:
         )
         message.timestamp.seconds, message.timestamp.nanos = divmod(one.stamp, 10**9)
         rows.append((one.topic, one.log_stamp, message.SerializeToString()))
-    return _mcap(folder, rows, ("arm.State", "protobuf", schema), "protobuf", log.metadata)
+    known = ("arm.State", "protobuf", schema)
+    return write_mcap(folder / "log.mcap", rows, known, metadata=log.metadata)
 
 
 def _lists(way: str, folder: Path, log: States) -> Path:
@@ -433,24 +428,35 @@ def _lists(way: str, folder: Path, log: States) -> Path:
         columns["log_time"] = [one.log_stamp for one in log.messages]
     if way == "jsonl[]":
         return _jsonl(folder, Flat(columns))
-    return _parquet(folder, Flat(columns, metadata=log.metadata))
+    return _table("parquet", folder, Flat(columns, metadata=log.metadata))
 
 
-def _bag1(folder: Path, log: States) -> Path:
+def bag1(folder: Path, log: States, packing: Ros1Writer.CompressionFormat | None = None) -> Path:
+    """Joint states as a ROS 1 bag of small chunks."""
     path = folder / "log.bag"
-    with Ros1Writer(path) as writer:
-        fill(writer, STORES[0], log, {"seq": 0})
+    writer = Ros1Writer(path)
+    writer.chunk_threshold = 4096
+    if packing is not None:
+        writer.set_compression(packing)
+    with writer:
+        _fill(writer, STORES[0], log, {"seq": 0})
     return path
 
 
-def _db3(folder: Path, log: States) -> Path:
+def bag2(
+    folder: Path,
+    log: States,
+    plugin: StoragePlugin = StoragePlugin.SQLITE3,
+    version: Literal[8, 9] = 9,
+) -> Path:
+    """Joint states as a rosbag2 folder."""
     path = folder / "log"
-    with Ros2Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
-        fill(writer, STORES[1], log, {})
+    with Ros2Writer(path, version=version, storage_plugin=plugin) as writer:
+        _fill(writer, STORES[1], log, {})
     return path
 
 
-def fill(writer: Any, store: Any, log: States, head: Mapping[str, int]) -> None:
+def _fill(writer: Any, store: Any, log: States, head: Mapping[str, int]) -> None:
     """Write joint states into a bag; `head` is what its headers have beside ROS 2's."""
     _usual_definition(log)
     if log.metadata:
@@ -474,4 +480,10 @@ def fill(writer: Any, store: Any, log: States, head: Mapping[str, int]) -> None:
         writer.write(connections[one.topic], one.log_stamp, serialize(message, of_type))
 
 
-_MESSAGE_WAYS = {"cdr": _cdr, "json": _json, "pb": _pb, "bag1": _bag1, "db3": _db3}
+_MESSAGE_WAYS: dict[str, Callable[[Path, States], Path]] = {
+    "cdr": _cdr,
+    "json": _json,
+    "pb": _pb,
+    "bag1": bag1,
+    "db3": bag2,
+}

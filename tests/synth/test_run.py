@@ -43,7 +43,6 @@ def test_an_object_is_grasped_and_let_go_without_a_step() -> None:
             log.theta[:, np.isin(t, own)], motion.theta[:, np.isin(every, own)], atol=1e-10
         )
         state = np.concatenate([motion.theta[:, -1], motion.omega[:, -1]])
-    assert log.origin.truth is not None
     assert log.origin.truth.schedule == ((0.2, 0.5), (0.405, 0.0))
     assert log.origin.truth.payload == 0.0
     assert log.origin.path == "mine-schedule"

@@ -44,7 +44,6 @@ RUBBING = Model(("coulomb",), coulomb_speed=0.1)
 
 def rubbing(log: Log, friction: float) -> Log:
     """The log with Coulomb friction of so many N m in both joints, as `RUBBING` has it."""
-    assert log.omega is not None
     return replace(log, tau=log.tau + friction * np.tanh(log.omega / RUBBING.coulomb_speed))
 
 

@@ -4,7 +4,6 @@ from the log.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,38 +11,18 @@ import pytest
 
 import algid
 from algid.base.errors import ResultError
-from algid.identification.identify import identify
-from algid.results import Result, read_result
+from algid.results import Result
 from algid.signals.segments import Segment, segments
 from algid.synth.sensors import Sensors
 from algid.tracks.arm import arm_of
-from algid.writers import write_log
 from tests.tracks.folders import CASE, noisy, without_coulomb
 
 
 @pytest.fixture(scope="module")
-def weighed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Result of an arm with its payload, which tells the lengths of its links."""
-    folder = tmp_path_factory.mktemp("weighed")
+def result() -> Result:
+    """Of an arm with its payload, which tells the lengths of its links."""
     logs = algid.synthesise("case1", duration=2.0, torque="wide", sensors=Sensors(1e-3, 1e-2))
-    assert logs[1] is not None
-    names = [folder / "bare.mcap", folder / "loaded.mcap"]
-    for path, log in zip(names, logs, strict=True):
-        write_log(path, log)
-    identify(
-        names[0],
-        loaded=names[1],
-        out=folder,
-        name="arm",
-        report=False,
-        settings=algid.Settings(model="plain"),
-    )
-    return folder / "arm.algid"
-
-
-@pytest.fixture
-def result(weighed: Path) -> Result:
-    return read_result(weighed)
+    return algid.identify(*logs, model="plain")
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +38,6 @@ def test_lengths_that_were_estimated_come_with_their_errors(result: Result, firs
     arm, covariance = without_coulomb(arm_of(result, first))
     assert arm.value("l1") == result.payload["l1"].estimate == pytest.approx(CASE.arm.l1, rel=0.05)
     assert arm.value("l2") == result.payload["l2"].estimate == pytest.approx(CASE.arm.l2, rel=0.05)
-    assert result.fit is not None
     stds = [
         result.estimates[name].std
         for name in ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "l1", "l2")
@@ -97,10 +75,7 @@ def test_a_bodys_shape_comes_with_its_error_of_each_kilogram(
     result: Result, first: Segment
 ) -> None:
     """J_p / m_p by the delta method, against draws from the result's covariance."""
-    assert result.fit is not None
     m_p = result.payload["m_p"]
-    assert m_p.estimate is not None
-    assert m_p.std is not None
     std = 2e-5
     J = m_p.model_copy(update={"estimate": 4e-4, "std": std, "unit": "kg m^2"})
     names = [*result.fit.covariance_names, "J_p"]
@@ -128,7 +103,6 @@ def test_the_first_length_by_the_constants_comes_with_what_it_shares_with_them(
     result: Result, first: Segment, bent: bool
 ) -> None:
     """l1 = g |K1| / |K2| and its covariances, against draws from the result's covariance."""
-    assert result.fit is not None
     fit, parameters = result.fit, dict(result.parameters)
     names, full = list(fit.covariance_names), np.array(fit.covariance)
     if bent:
@@ -140,7 +114,6 @@ def test_the_first_length_by_the_constants_comes_with_what_it_shares_with_them(
         for row, (name, part) in enumerate(sines.items(), start=len(names)):
             turn[row, [names.index(name[:2]), names.index("l2")]] = 2 * part, 1e-3 * part
         names, full = [*names, *sines], turn @ full @ turn.T
-        assert fit.model is not None
         fit = fit.model_copy(update={"model": fit.model.model_copy(update={"terms": ["phases"]})})
     changed = result.model_copy(
         update={

@@ -14,18 +14,17 @@ from algid.base.errors import LogError
 from algid.identification.identify import identify
 from algid.log import Log, Origin
 from algid.model import Model
-from algid.notices import Notice
-from algid.results import LogSummary
 from algid.settings import Settings
 from algid.signals.segments import segments
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 from algid.tracks.arm import IdentifiedArm
 from algid.tracks.cells import CELL, Cells, cells_of, joined
-from algid.tracks.payload import HALF_BAND, Stretch, Track, track
+from algid.tracks.payload import HALF_BAND, Stretch, track
 from algid.tracks.result import StretchStatus, TrackResult
 from algid.tracks.run import track_log
 from tests.tracks.folders import CASE, carrier, noisy
+from tests.tracks.test_tables import track as masses_of
 
 ARM = carrier()
 NOTHING = np.zeros((9, 9))
@@ -48,12 +47,6 @@ def loaded(mass: float, duration: float = 3.0, seed: int = 3) -> Log:
         Origin("picking.csv", "csv", {}),
     )
     return noisy(log, np.random.default_rng(seed))
-
-
-def test_a_kilogram_at_the_tip_adds_table_2_to_the_constants() -> None:
-    l1, l2, g = CASE.arm.l1, CASE.arm.l2, 9.81
-    assert ARM.unit.tolist() == pytest.approx([l1 * l2, g * l2, l2**2, g * l1, l1**2, 0, 0])
-    assert ARM.tip_equivalent == pytest.approx(CASE.arm.constants()[2] / l2**2)
 
 
 @pytest.mark.parametrize("mass", [0.0, 0.3])
@@ -124,28 +117,10 @@ def weighed_arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "arm.algid"
 
 
-def judged(
-    *stretches: Stretch, bare: float = 0.1, schedule: tuple[tuple[float, float], ...] | None = None
-) -> TrackResult:
-    nothing = np.zeros(0)
-    found = Track(
-        list(stretches), nothing, nothing, nothing, nothing, nothing,
-        np.array([[2.0, 1.9, 2.1]]), 1.5, 0.99, np.array([[5.0, 6.0]]), bare,
-    )  # fmt: skip
-    log = LogSummary(
-        path="a",
-        sha256=None,
-        role="loaded",
-        format="csv",
-        rows=2,
-        start_ns=0,
-        duration=1.0,
-        rate=1.0,
-        mapping={},
-    )
-    return TrackResult(
-        found, log, "arm", "0" * 64, {"l1": 0.3}, "1", schedule, (Notice("A", "a warning"),), True
-    )
+def judged(*stretches: Stretch) -> TrackResult:
+    made = masses_of([0.0] * len(stretches))
+    found = replace(made.track, stretches=list(stretches), tip_equivalent=0.1)
+    return replace(made, track=found)
 
 
 @pytest.mark.parametrize(
@@ -182,6 +157,8 @@ def test_an_object_is_shaped_like_the_payload_that_was_identified() -> None:
     assert complex(added["k1"], added["k1s"]) == pytest.approx(0.4 * r)
     assert complex(added["k2"], added["k2s"]) == pytest.approx(9.81 * r)
     assert complex(added["k4"], added["k4s"]) == pytest.approx(9.81 * 0.4)
+    assert added["k5"] == pytest.approx(0.4**2)
+    assert ARM.tip_equivalent == pytest.approx(CASE.arm.constants()[2] / CASE.arm.l2**2)
 
 
 @pytest.mark.parametrize("name", ["l1", "l2", "y_p", "J_p"])

@@ -36,7 +36,6 @@ def segment() -> Segment:
 def test_the_better_of_constants_and_payload_is_taken(weighed: Result) -> None:
     by_constants = first_length(weighed)
     told = weighed.payload["l1"].estimate
-    assert by_constants is not None
     sure = with_payload_std(weighed, by_constants[1] / 2)
     unsure = with_payload_std(weighed, by_constants[1] * 2)
     assert payload_length(sure) == (told, by_constants[1] / 2)

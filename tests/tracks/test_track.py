@@ -140,7 +140,6 @@ def test_a_log_carries_its_schedule(picking: Log, tmp_path: Path, suffix: str) -
     path = tmp_path / f"picking.{suffix}"
     write_log(path, picking.part(0, 50), truth=picking.origin.truth)
     truth = algid.read_log(path).origin.truth
-    assert truth is not None
     assert truth.schedule == ((1.5, 0.05), (3.0, 0.0))
     with pytest.raises(LogError, match="the payload changes; weigh it with algid track"):
         identify(path)
