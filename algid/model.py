@@ -483,10 +483,11 @@ def moments_of(values: Mapping[str, float]) -> tuple[complex, complex, complex]:
 def length_by_coupling(values: Mapping[str, float], gravity: float) -> float | None:
     """l1 = g |K1| / |K2| in m (Table 1), by the coefficients by name; `gravity` in m/s².
 
-    It has the sign of k1 k2: an arm's is positive. None without gravity, k1 or k2.
+    It is negative where both are more than a right angle apart: an arm's is positive. None without
+    gravity, k1 or k2.
     """
     first, second, _ = moments_of(values)
-    sign = float(np.sign(first.real * second.real))
+    sign = float(np.sign((first * second.conjugate()).real))
     if not gravity or not sign:
         return None
     return gravity * abs(first) / abs(second) * sign

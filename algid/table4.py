@@ -10,7 +10,7 @@ from algid.base.names import within
 from algid.estimators.paper import STAGE1_NAMES
 from algid.log import Truth
 from algid.model import UNITS as PARAMETER_UNITS
-from algid.results import Table4Row
+from algid.results import Estimate, Table4Row
 
 Rows = dict[str, tuple[str, ...]]
 """Constants by the row that is their sum; a loaded one holds the payload's share, z, too."""
@@ -45,10 +45,7 @@ def true_parameters(truth: Truth | None, payload: float | None) -> dict[str, flo
 
 
 def table4(
-    estimates: Mapping[str, float],
-    std: Mapping[str, float],
-    truth: Truth | None,
-    payload: float | None,
+    estimates: Mapping[str, Estimate], truth: Truth | None, payload: float | None
 ) -> list[Table4Row]:
     """The twelve rows; what was not estimated, or is not known, is null.
 
@@ -69,12 +66,13 @@ def table4(
             paper = case.paper_error_percent
     rows = []
     for name, unit in UNITS.items():
-        estimate, known = finite(estimates.get(name)), true.get(name)
+        own, known = estimates.get(name, Estimate(estimate=None, unit=unit)), true.get(name)
+        estimate = own.estimate
         row = Table4Row(
             parameter=name,
             unit=unit,
             estimate=estimate,
-            std=finite(std.get(name)),
+            std=own.std,
             truth=known,
             error_percent=100 * abs(estimate / known - 1)
             if known and estimate is not None

@@ -44,6 +44,7 @@ from algid.model import (
     SINES,
     Model,
     inertia,
+    length_by_coupling,
     phasor,
 )
 from algid.notices import Notice
@@ -109,7 +110,6 @@ def broken_bounds(fit: Fit) -> list[BrokenBound]:
     A parameter that the logs leave open breaks none, nor does a term that is shrunk: it takes up
     what the model lacks.
     """
-    size = sizes(fit.names, fit.values)
     unknown = list(fit.absent)
     for name, deviation in zip(fit.names, fit.std, strict=True):
         if np.isinf(deviation):
@@ -126,8 +126,7 @@ def broken_bounds(fit: Fit) -> list[BrokenBound]:
         value = bound(fit.values)
         if value >= 0 or name in open_ones:
             continue
-        slope = _slope(bound, fit.values, size)
-        deviation = float(np.sqrt(max(0.0, float(slope @ fit.covariance @ slope))))
+        _, deviation = measured(fit, bound)
         distance = None
         if deviation > 0:
             distance = -value / deviation
@@ -143,19 +142,22 @@ def length_by_constants(fit: Fit) -> tuple[float, float] | None:
     No gain of both torques changes it: where it is not the length that is known, gravity is
     compensated in part, or the zeros or the terms of the torque are wrong.
     """
-    if fit.shared.model.gravity == 0 or {K1, K2} & set(fit.absent):
-        return None
-    first, second = fit.names.index(K1), fit.names.index(K2)
-    if np.any(np.isinf(fit.std[[first, second]])) or not fit.values[second]:
+    known = np.array(fit.names)[np.isfinite(fit.std)].tolist()
+    if not {K1, K2} <= set(known) - set(fit.absent):
         return None
 
     def length(beta: FloatArray) -> float:
-        k1, k2 = phasor(fit.shared.model, beta, K1), phasor(fit.shared.model, beta, K2)
-        sign = np.copysign(1.0, (k1 * k2.conjugate()).real)
-        return float(sign * fit.shared.model.gravity * abs(k1) / abs(k2))
+        values = dict(zip(fit.names, beta.tolist(), strict=True))
+        return length_by_coupling(values, fit.shared.model.gravity) or 0.0
 
-    slope = _slope(length, fit.values, sizes(fit.names, fit.values))
-    return length(fit.values), float(np.sqrt(max(float(slope @ fit.covariance @ slope), 0.0)))
+    return measured(fit, length) if length(fit.values) else None
+
+
+def measured(fit: Fit, function: Callable[[FloatArray], float]) -> tuple[float, float]:
+    """A function of the parameters (Q,) at their values, and its standard deviation."""
+    slope = _slope(function, fit.values, sizes(fit.names, fit.values))
+    variance = float(slope @ fit.covariance @ slope)
+    return function(fit.values), float(np.sqrt(max(variance, 0.0)))
 
 
 def _slope(bound: Callable[[FloatArray], float], beta: FloatArray, size: FloatArray) -> FloatArray:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import partial
-from itertools import zip_longest
+from itertools import islice, zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.base.errors import LogError
+from algid.base.names import within
 from algid.estimators.diagnostics import FAR_BEYOND
 from algid.estimators.paper import (
     SHORTEST,
@@ -25,13 +26,14 @@ from algid.estimators.paper import (
     stage2,
     wanders,
 )
-from algid.identification.outcome import Identified, distrusted
+from algid.identification.outcome import distrusted, started
 from algid.identification.passes import with_velocities
 from algid.identification.recordings import Recording, Recordings
 from algid.identification.series import write_columns
 from algid.methods import settles
 from algid.model import UNITS as PARAMETER_UNITS
-from algid.results import Estimate, Status
+from algid.options import flag
+from algid.results import Estimate, Result, Status
 from algid.settings import Settings
 from algid.table4 import UNITS, UNLOADED_ROWS, finite, sums
 
@@ -45,53 +47,53 @@ ROWS = 1 << 17  # of a block of the series
 
 def run_paper(
     survey: Recordings,
-    unloaded: Recording | None,
-    loaded: Recording | None,
     settings: Settings,
     known: FloatArray | None = None,
     folder: Path | None = None,
-) -> Identified:
-    """Stage 1 on `unloaded`, or the `known` constants (7,); stage 2 on `loaded`.
+) -> Result:
+    """Stage 1 on the first unloaded log, or the `known` constants (7,); stage 2 on the loaded one.
 
     Series into `folder`.
 
     Raises
     ------
     LogError
-        If a log is shorter than the estimates need to settle, or lacks velocities that were asked
-        for.
+        If there are several logs of a kind and no other estimator, or if a log is shorter than the
+        estimates need to settle, or lacks velocities that were asked for.
     """
-    parameters: dict[str, Estimate] = {}
-    rows: dict[str, float] = {}
+    for logs in (survey.unloaded, survey.loaded):
+        if settles(settings.estimator) and len(logs) > 1:
+            raise LogError(
+                f"{logs[1].name}: the paper's method takes one log of each kind; give one, or use "
+                f"{flag('estimator')} refined or weak"
+            )
+    parameters, of_loaded = dict[str, Estimate](), dict[str, Estimate]()
+    rows, wrong = dict[str, Estimate](), list[str]()
+    payload = ("m_p", "l1")
     k = known
-    if unloaded is not None:
-        values, wander, usable = _estimate(survey, unloaded, settings, None, folder)
+    if survey.unloaded:
+        values, wander, usable = _estimate(survey, survey.unloaded[0], settings, None, folder)
         k = values[: len(CONSTANT_NAMES)]
         parameters = _named(CONSTANT_NAMES, values, usable)
         if _is_no_arm(np.where(usable[: k.size], k, np.nan), wander):
-            parameters = distrusted(parameters)
+            wrong.append("parameters")
         if usable.all():
-            rows |= sums(UNLOADED_ROWS, k)
-    if loaded is None:
-        return Identified(parameters, {}, {}, rows)
-    payload = ("m_p", "l1")
-    if k is None or not np.isfinite(k).all():
-        return Identified(parameters, _named(STAGE2_NAMES), _named(payload), rows)
-    values, wander, usable = _estimate(survey, loaded, settings, k, folder)
-    names = STAGE2_NAMES + ("l1", "m_p")
-    named = _named(names, values, usable)
-    of_payload = slice(len(STAGE2_NAMES), len(names))
-    if np.any((values + FAR_BEYOND * wander)[of_payload] < 0):
-        named = distrusted(named)
-    for name, one in named.items():
-        if name in UNITS and one.estimate is not None:
-            rows[name] = one.estimate
-    return Identified(
-        parameters,
-        {name: named[name] for name in STAGE2_NAMES},
-        {name: named[name] for name in payload},
-        rows,
-    )
+            rows = _named(UNLOADED_ROWS, np.array([*sums(UNLOADED_ROWS, k).values()]), usable)
+    if survey.loaded:
+        names = STAGE2_NAMES + ("l1", "m_p")
+        of_loaded = _named(names)
+        if k is not None and np.isfinite(k).all():
+            values, wander, usable = _estimate(survey, survey.loaded[0], settings, k, folder)
+            of_loaded = _named(names, values, usable)
+            if np.any((values + FAR_BEYOND * wander)[len(STAGE2_NAMES) : len(names)] < 0):
+                wrong += ["loaded", "payload"]
+    changes = {
+        "parameters": parameters,
+        "loaded": {name: of_loaded[name] for name in within(STAGE2_NAMES, of_loaded)},
+        "payload": {name: of_loaded[name] for name in within(payload, of_loaded)},
+    }
+    result = started(survey, settings, rows | of_loaded)
+    return distrusted(result.model_copy(update=changes), wrong)
 
 
 def _estimate(
@@ -173,11 +175,11 @@ def _is_no_arm(k: FloatArray, wander: FloatArray) -> bool:
 
 
 def _named(
-    names: Sequence[str], values: FloatArray = NOTHING, usable: NDArray[np.bool_] = NOTHING > 0
+    names: Collection[str], values: FloatArray = NOTHING, usable: NDArray[np.bool_] = NOTHING > 0
 ) -> dict[str, Estimate]:
     """Estimates by name; those that are not usable have none, as all have where stage 1 failed."""
     named = {}
-    for name, value, good in zip_longest(names, values[: len(names)], usable[: len(names)]):
+    for name, value, good in islice(zip_longest(names, values, usable), len(names)):
         weak = Estimate(estimate=None, unit=_UNITS[name], status=Status.WEAK_EXCITATION)
         named[name] = Estimate(estimate=finite(value), unit=_UNITS[name]) if good else weak
     return named

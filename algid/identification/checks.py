@@ -7,12 +7,20 @@ symbol  name                                   shape     unit
 ======  =====================================  ========  =======
 K       phasor of a moment, k + i k_s          scalar    its own
 a       its argument                           scalar    rad
-slope   ∂a/∂β                                  (Q,)      mixed
 ======  =====================================  ========  =======
 
 With centres of mass turned by δ off the lines and zeros off by ε: arg K2 − arg K1 = ε1, and arg K1
 = δ2 + ε2, whose parts no torque separates. arg K4 − ε1 is where the load of joint 1 lies that
 turns with link 1.
+
+**Effort.** A driver may log a torque without gravity, or without any of the arm's. Physics binds
+the constants together: with the link lengths l1 and lc2
+
+    k2 = g k1 / l1,   k4 >= g k1 / lc2,   and of a payload   z4 = g z1 / l1
+
+so that an arm whose inertia is known and that weighs nothing, unless both lengths are those of no
+arm, is logged without its weight. If the payload's own weight is there, the arm does not move in a
+horizontal plane.
 """
 
 from __future__ import annotations
@@ -25,18 +33,21 @@ import numpy as np
 
 from algid import results
 from algid.arm import FloatArray
-from algid.base.significance import chance
+from algid.base.names import within
+from algid.base.significance import SURE, chance
 from algid.base.units import TORQUE
+from algid.estimators.combine import of_kind
 from algid.estimators.diagnostics import (
     FAR_BEYOND,
     bent,
     broken_bounds,
     constrained,
     length_by_constants,
+    measured,
     payload_distance,
 )
 from algid.estimators.excitation import contradicted, undriven
-from algid.estimators.fit import Fit, solved_anew
+from algid.estimators.fit import Fit, alone, solved_anew
 from algid.estimators.prediction import PredictionScore
 from algid.estimators.robust import unshrunk
 from algid.identification.by_likelihood import Fitted
@@ -45,8 +56,27 @@ from algid.identification.passes import problem_of
 from algid.identification.recordings import Recording
 from algid.identification.series import predictor_of_fit
 from algid.identification.validate import prediction, scores
-from algid.model import FIRST_TERMS, K1, K2, K4, RIGID, SINE_OF, SINES, phasor
+from algid.model import (
+    EVERY_TERM,
+    FIRST_TERMS,
+    K1,
+    K2,
+    K3,
+    K4,
+    K5,
+    K6,
+    K7,
+    MOMENTS,
+    RIGID,
+    SINE_OF,
+    SINES,
+    names_of,
+    phasor,
+    terms_named,
+)
 from algid.notices import Notice, Remedy, has_code
+from algid.physics.effort import FRICTION
+from algid.settings import Settings
 
 STEEL, AIR = 8000.0, 1.2  # kg/m³
 LEAST_SURE = 10.0  # standard deviations that a length has to have
@@ -161,15 +191,11 @@ def _of_phases(found: Fitted) -> Iterator[Notice]:
     fit = found.fit
     if set(SINES).isdisjoint(fit.names) or (fit.shrinkage is not None and not bent(fit)):
         return
-    second, of_second = _argument(fit, K1)
-    numbers = {"case": "no gravity", "second": _in_degrees(fit, second, of_second)}
+    numbers = {"case": "no gravity", "second": _in_degrees(*_angle(fit, K1))}
     if {K2, K4} <= set(fit.names) - set(fit.absent):
-        whole, of_whole = _argument(fit, K2)
-        load, of_load = _argument(fit, K4)
-        first, of_first = whole - second, of_whole - of_second
         numbers["case"] = "gravity"
-        numbers["first"] = _in_degrees(fit, first, of_first)
-        numbers["load"] = _in_degrees(fit, load - first, of_load - of_first)
+        numbers["first"] = _in_degrees(*_angle(fit, K2, K1))
+        numbers["load"] = _in_degrees(*_angle(fit, K4, K2, K1))
     yield Notice("PHASES", numbers=numbers)
 
 
@@ -353,11 +379,15 @@ def turn_note(fit: Fit, log: Recording) -> Iterator[Notice]:
     names = set(fit.names) - set(fit.absent)
     if not {K1, K2, SINE_OF[K1], SINE_OF[K2]} <= names or fit.shared.model.gravity == 0:
         return
-    if min(_certainty(fit, K1), _certainty(fit, K2)) < LEAST_CERTAIN:
+
+    def uncertain(name: str) -> bool:
+        size, std = measured(fit, lambda beta: abs(phasor(fit.shared.model, beta, name)))
+        unknown = np.isinf(fit.std[[fit.names.index(name), fit.names.index(SINE_OF[name])]])
+        return bool(unknown.any()) or not size > LEAST_CERTAIN * std > 0
+
+    if uncertain(K1) or uncertain(K2):
         return
-    (second, of_second), (whole, of_whole) = _argument(fit, K1), _argument(fit, K2)
-    turn = float(np.remainder(whole - second + np.pi, 2 * np.pi) - np.pi)
-    half = _half(fit, of_whole - of_second)
+    turn, half = _angle(fit, K2, K1)
     if not abs(turn) - half > LEAST_TURN or abs(turn) + half >= np.pi:
         return
     anyway = Remedy({"accept": "WRONG_ZERO"}, "where the arm is mounted so")
@@ -365,32 +395,113 @@ def turn_note(fit: Fit, log: Recording) -> Iterator[Notice]:
     yield Notice("WRONG_ZERO", numbers=numbers, remedies=(zeroed(log.origin, turn, half), anyway))
 
 
-def _certainty(fit: Fit, name: str) -> float:
-    """Size of the moment `name` in its standard deviations."""
-    places = [fit.names.index(name), fit.names.index(SINE_OF[name])]
-    K = fit.values[places]
-    size = float(np.linalg.norm(K))
-    variance = float(K @ fit.covariance[np.ix_(places, places)] @ K)
-    if not np.all(np.isfinite(fit.std[places])) or variance <= 0:
-        return 0.0
-    return size**2 / float(np.sqrt(variance))
+def _angle(fit: Fit, *names: str) -> tuple[float, float]:
+    """Arg K − arg K' + arg K'' of moments by `names`, and half its 95 % interval, in rad."""
+
+    def product(beta: FloatArray) -> complex:
+        K = [phasor(fit.shared.model, beta, name) for name in names]
+        K[1:2] = [one.conjugate() for one in K[1:2]]
+        return complex(np.prod(K))
+
+    found = product(fit.values)
+    # beside its own value no angle is cut at half a turn
+    _, std = measured(fit, lambda beta: float(np.angle(product(beta) * found.conjugate())))
+    return float(np.angle(found)), fit.quantile * std
 
 
-def _argument(fit: Fit, name: str) -> tuple[float, FloatArray]:
-    """Argument of the moment `name` and its slope (Q,)."""
-    K = phasor(fit.shared.model, fit.values[: len(fit.shared.model.names)], name)
-    slope = np.zeros(len(fit.names))
-    square = max(abs(K) ** 2, 1e-300)
-    slope[fit.names.index(name)] = -K.imag / square
-    slope[fit.names.index(SINE_OF[name])] = K.real / square
-    return float(np.angle(K)), slope
+def _in_degrees(angle: float, half: float) -> str:
+    return f"{np.degrees(angle):.3g}° ± {np.degrees(half):.2g}°"
 
 
-def _in_degrees(fit: Fit, angle: float, slope: FloatArray) -> str:
-    turned = float(np.degrees(np.remainder(angle + np.pi, 2 * np.pi) - np.pi))
-    return f"{turned:.3g}° ± {np.degrees(_half(fit, slope)):.2g}°"
+LONGEST, BOTH_LONG = 5.0, 2.0
+"""m: no link is longer, and no two links are."""
+NO_DAMPING = 0.02  # of critical damping: less than any joint's friction
+NO_ARM = 0.1  # of the loaded arm's inertia: less than any unloaded arm's
+
+Known = dict[str, tuple[float, float]]
+"""Values and standard deviations by name."""
 
 
-def _half(fit: Fit, slope: FloatArray) -> float:
-    """Half the 95 % interval of what has this slope (Q,)."""
-    return fit.quantile * float(np.sqrt(max(float(slope @ fit.covariance @ slope), 0.0)))
+def of_effort(fit: Fit, settings: Settings) -> tuple[Settings, list[Notice]]:
+    """The settings with the effort, or without gravity, that the logs of `fit` show.
+
+    With it notices of what was not asked for.
+    """
+    shown, notices = settings, list[Notice]()
+    unloaded, loaded = _own(fit, False), _own(fit, True)
+    gravity, l1 = fit.shared.model.gravity, fit.shared.lengths.get("l1")
+    if gravity > 0:
+        # an arm with coupling but no weight, by unloaded logs alone, or else by the fit
+        sizes = [_size(unloaded or _of_fit(fit), name) for name in MOMENTS]
+        (k1, of_k1), (k2, of_k2), (k4, of_k4) = sizes
+        most, least = max(k2 + SURE * of_k2, k4 + SURE * of_k4), gravity * k1 / (l1 or BOTH_LONG)
+        if shown.effort is None and k1 > SURE * of_k1 and most < least:
+            shown = shown.but(effort="gravity-compensated")
+        if shown.effort == "gravity-compensated" and unloaded and loaded:
+            # a payload with inertia about joint 1 but no weight
+            z1, z4 = (loaded[name][0] - unloaded[name][0] for name in (K5, K4))
+            of_z1, of_z4 = (np.hypot(loaded[name][1], unloaded[name][1]) for name in (K5, K4))
+            if z1 > SURE * of_z1 and abs(z4) + SURE * of_z4 < gravity * z1 / (l1 or LONGEST):
+                shown = shown.but(gravity=0.0)
+                notices.append(Notice("GRAVITY_COMPENSATED", numbers={"case": "payload"}))
+    if settings.effort is not None:
+        return shown, notices
+    if shown.effort is not None:
+        case = "arm alone"
+        remedies = [Remedy({"effort": "gravity-compensated"}, "for such a driver")]
+        if not fit.shared.payload or shown.gravity == 0:
+            case = "arm"
+            remedies.append(Remedy({"gravity": 0}, "for a horizontal plane"))
+        numbers = {"case": case}
+        notices.append(Notice("GRAVITY_COMPENSATED", numbers=numbers, remedies=tuple(remedies)))
+    elif _external(unloaded, loaded):
+        notices.append(Notice("EXTERNAL_EFFORT", remedies=(Remedy({"effort": "external"}),)))
+    elif _without_friction(fit):
+        compensated = Remedy({"effort": "friction-compensated"}, "for such a driver")
+        notices.append(Notice("FRICTION_COMPENSATED", remedies=(compensated,)))
+    return shown, notices
+
+
+def _external(unloaded: Known, loaded: Known) -> bool:
+    """Whether unloaded logs have nothing of an arm in their torque, and loaded ones do."""
+    if not (unloaded and loaded) or not loaded[K5][0] > SURE * loaded[K5][1]:
+        return False
+    none = [abs(unloaded[k][0]) + SURE * unloaded[k][1] < NO_ARM * loaded[k][0] for k in (K3, K5)]
+    return all(none)
+
+
+def _without_friction(fit: Fit) -> bool:
+    dry = names_of(terms_named(within(FRICTION[1:], EVERY_TERM)))
+    if fit.absent or (fit.shrinkage is None and set(dry) & set(fit.names)):
+        return False
+    known = _of_fit(fit)
+    k3, k4, k5 = (_size(known, name)[0] for name in (K3, K4, K5))
+    most = NO_DAMPING * float(np.sqrt((k3 + k5) * k4))
+    for name in (K6, K7):
+        value, std = _size(known, name)
+        if value >= SURE * std or value + SURE * std >= most:
+            return False
+    return True
+
+
+def _size(known: Known, name: str) -> tuple[float, float]:
+    """Size of a constant, with its sine part where it has one, and its standard deviation.
+
+    Both are 0 without a column.
+    """
+    value, std = known.get(name, (0.0, 0.0))
+    across, _ = known.get(SINE_OF.get(name, ""), (0.0, 0.0))
+    return float(np.hypot(value, across)), std
+
+
+def _of_fit(fit: Fit) -> Known:
+    """The fit's value of each parameter, with its standard deviation even where it is open."""
+    spreads = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    pairs = zip(fit.values.tolist(), spreads.tolist(), strict=True)
+    return dict(zip(fit.names, pairs, strict=True))
+
+
+def _own(fit: Fit, loaded: bool) -> Known:
+    """Each coefficient by the logs of one kind alone; empty without such a log."""
+    logs = of_kind(fit.logs, loaded)
+    return _of_fit(alone(fit.shared, logs)) if logs else {}

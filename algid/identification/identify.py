@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from algid.arm import CONSTANT_NAMES
-from algid.base.errors import LogError, ResultError, SettingError
+from algid.arm import CONSTANT_NAMES, FloatArray
+from algid.base.errors import ResultError, SettingError
 from algid.base.files import refuse_misleading, result_folder, whole_folder
 from algid.base.progress import Progress
 from algid.base.runtime import one_blas_thread
 from algid.estimators.paper import SHORTEST
 from algid.identification.by_paper import run_paper
-from algid.identification.known import contradictions, reused
+from algid.identification.known import contradictions, prior_of, reused
 from algid.identification.open_logs import (
     LogLike,
     open_sources,
     read_otherwise,
 )
-from algid.identification.outcome import Identified, result_of
-from algid.identification.recordings import Recording, Recordings
+from algid.identification.outcome import judged
+from algid.identification.recordings import Recordings
 from algid.identification.series import residual_of, write_fit_series
 from algid.methods import estimator_of, settles
 from algid.options import flag
@@ -55,6 +55,18 @@ class Earlier:
         if isinstance(parameters, Result):
             return cls(parameters, parameters.log.path)
         return cls(read_result(parameters), str(parameters))
+
+    @property
+    def constants(self) -> FloatArray:
+        """Its k1 … k7 (7,); raises `ResultError` where it lacks one."""
+        found = [self.result.parameters.get(name) for name in CONSTANT_NAMES]
+        known = np.array([one and one.estimate for one in found], dtype=np.float64)
+        if np.isnan(known).any():
+            raise ResultError(
+                f"{self.file}: the result lacks a constant; identify the arm from a better log "
+                "first"
+            )
+        return known
 
 
 def identify(
@@ -209,43 +221,19 @@ def _identified(
     """
     with one_blas_thread():
         if settles(settings.estimator):
-            outcome = _by_the_paper(survey, settings, earlier, folder)
+            known = None if earlier is None else earlier.constants
+            result = run_paper(survey, settings, known, folder)
         else:
-            outcome, settings = _by_likelihood(
-                survey, settings, earlier, stated, folder if series else None
-            )
-        result = result_of(outcome, settings, survey)
+            result = _by_likelihood(survey, settings, earlier, stated, folder if series else None)
+        result = judged(result, survey)
     notices = result.notices
     if earlier is not None:
-        lengths = {name: one for name in ("l1", "l2") if (one := getattr(settings, name))}
         notices = (
             read_otherwise(result.logs, earlier.result, earlier.file)
-            + list(contradictions(earlier.result, lengths))
+            + list(contradictions(earlier.result, settings.lengths))
             + notices
         )
     return result.model_copy(update={"profile": stated, "notices": notices})
-
-
-def _by_the_paper(
-    survey: Recordings, settings: Settings, earlier: Earlier | None, folder: Path | None
-) -> Identified:
-    for logs in (survey.unloaded, survey.loaded):
-        if len(logs) > 1:
-            raise LogError(
-                f"{logs[1].name}: the paper's method takes one log of each kind; give one, or use "
-                f"{flag('estimator')} refined or weak"
-            )
-    known = None
-    if earlier is not None:
-        found = [earlier.result.parameters.get(name) for name in CONSTANT_NAMES]
-        known = np.array([one and one.estimate for one in found], dtype=np.float64)
-        if np.isnan(known).any():
-            raise ResultError(
-                f"{earlier.file}: the result lacks a constant; identify the arm from a better log "
-                "first"
-            )
-    first, first_loaded = _firsts(survey)
-    return run_paper(survey, first, first_loaded, settings, known, folder)
 
 
 def _by_likelihood(
@@ -253,14 +241,10 @@ def _by_likelihood(
     settings: Settings,
     earlier: Earlier | None,
     stated: dict[str, Any],
-    folder: Path | None = None,
-) -> tuple[Identified, Settings]:
-    """The outcome of the logs, and the settings with the effort that they show.
-
-    A zero of θ1 that is `stated` is not doubted.
-    """
-    from algid.identification.checks import doubted, turn_note
-    from algid.identification.efforts import of_effort
+    folder: Path | None,
+) -> Result:
+    """The result of the logs, its settings with the effort that they show."""
+    from algid.identification.checks import doubted, of_effort, turn_note
     from algid.identification.outcome import outcome_of
     from algid.identification.prior import statement_of, with_prior
 
@@ -275,35 +259,39 @@ def _by_likelihood(
     if said is not None:
         found = replace(found, fit=with_prior(found.fit, said))
     survey.begin("prediction")
-    outcome = outcome_of(found)
+    result = outcome_of(found)
     turned: Iterable[Notice] = ()
-    if earlier is None and not _zero_is_stated(survey.logs[0], stated):
-        turned = turn_note(found.fit, survey.logs[0])
-    outcome = replace(outcome, notices=[*turned, *outcome.notices, *of_driver])
-    if folder is not None:
-        survey.begin("series")
-        write_fit_series(folder, found, residual_of(found))
-        if estimator_of(settings.estimator).beside_paper:
-            outcome = _with_the_papers(outcome, survey, found.settings, folder)
-    return outcome, found.settings
-
-
-def _zero_is_stated(log: Recording, stated: dict[str, Any]) -> bool:
-    """Whether the caller, or the log itself, says what θ1 is measured from."""
+    log = survey.logs[0]
     reading = log.origin.reading
-    of_channel = stated.get("theta1") or {}
-    return (
-        not {"zero", "offsets"}.isdisjoint(stated)
-        or "offset" in of_channel
-        or reading.zero != "horizontal"
-        or reading.offsets[0] != 0
-    )
+    # what the caller, or the log itself, says that θ1 is measured from is not doubted
+    known = {"zero", "offsets"} & set(stated) or "offset" in (stated.get("theta1") or {})
+    known = known or reading.zero != "horizontal" or reading.offsets[0] != 0
+    if earlier is None and not known:
+        turned = turn_note(found.fit, log)
+    notices = [*turned, *result.notices, *of_driver]
+    result = result.model_copy(update={"notices": notices})
+    if folder is None:
+        return result
+    survey.begin("series")
+    write_fit_series(folder, found, residual_of(found))
+    # beside them the paper's series of the first log of each kind, and its payload route
+    logs = [*survey.unloaded[:1], *survey.loaded[:1]]
+    if (
+        estimator_of(settings.estimator).beside_paper
+        and survey.unloaded
+        and found.settings.gravity
+        and not absent(found.settings.effort, CONSTANT_NAMES)
+        and all(SHORTEST <= one.duration <= SERIES_SECONDS for one in logs)
+    ):
+        survey.begin("series", logs)
+        by_paper = run_paper(survey, found.settings, None, folder)
+        result = result.model_copy(update={"paper_payload": by_paper.payload})
+    return result
 
 
 def _fitted(survey: Recordings, settings: Settings, earlier: Earlier | None) -> Fitted:
     """The fit with the terms that the logs choose."""
     from algid.identification.by_likelihood import choose_model, run_fit
-    from algid.identification.known import prior_of
 
     survey.begin("choosing terms")
     if earlier is None:
@@ -315,28 +303,3 @@ def _fitted(survey: Recordings, settings: Settings, earlier: Earlier | None) -> 
     settings = settings.but(torque_hold=chosen.hold)
     found = run_fit(survey, settings, chosen, prior)
     return replace(found, settings=settings.but(torque_hold=found.chosen.hold))
-
-
-def _with_the_papers(
-    outcome: Identified, survey: Recordings, settings: Settings, folder: Path
-) -> Identified:
-    """The outcome with the paper's series of the first log of each kind, and its payload route."""
-    first, second = _firsts(survey)
-    logs = [log for log in (first, second) if log is not None]
-    durations = [survey.summary(log).duration for log in logs]
-    if (
-        first is None
-        or settings.gravity == 0
-        or absent(settings.effort, CONSTANT_NAMES)
-        or min(durations) < SHORTEST
-        or max(durations) > SERIES_SECONDS
-    ):
-        return outcome
-    survey.begin("series", logs)
-    return replace(
-        outcome, paper_payload=run_paper(survey, first, second, settings, None, folder).payload
-    )
-
-
-def _firsts(survey: Recordings) -> tuple[Recording | None, Recording | None]:
-    return next(iter(survey.unloaded), None), next(iter(survey.loaded), None)

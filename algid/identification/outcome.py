@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import PurePath
 from typing import Any
@@ -40,34 +40,41 @@ from algid.table4 import (
 )
 from algid.table4 import UNITS as TABLE_UNITS
 
-
-@dataclass(frozen=True, eq=False)
-class Identified:
-    """Estimates by name, Table 4's rows with standard deviations, and diagnostics."""
-
-    parameters: dict[str, Estimate]
-    loaded: dict[str, Estimate]
-    payload: dict[str, Estimate]
-    rows: Mapping[str, float]
-    estimator: str | None = None
-    """Whose estimates these are, where not those of the estimator asked for."""
-    stds: Mapping[str, float] = field(default_factory=dict)
-    paper_payload: dict[str, Estimate] = field(default_factory=dict)
-    fit: results.FitSummary | None = None
-    notices: list[Notice] = field(default_factory=list)
-
-    def distrusted(self) -> Identified:
-        """The same with no status OK left."""
-        return replace(
-            self,
-            parameters=distrusted(self.parameters),
-            loaded=distrusted(self.loaded),
-            payload=distrusted(self.payload),
-        )
+GROUPS = ("parameters", "loaded", "payload")
 
 
-def outcome_of(found: Fitted) -> Identified:
-    """The fit as a result holds it.
+def started(survey: Recordings, settings: Settings, rows: Mapping[str, Estimate]) -> Result:
+    """A result of a survey's logs with Table 4's `rows`, yet without parameters."""
+    truth = survey.logs[0].origin.truth
+    payload = None
+    if survey.loaded and survey.loaded[0].origin.truth:
+        payload = survey.loaded[0].origin.truth.payload
+    first, *others = map(survey.summary, survey.logs)
+    return Result(
+        version=__version__,
+        estimator=settings.estimator,
+        parameters={},
+        table4=table4(rows, truth, payload),
+        truth=true_parameters(truth, payload),
+        settings=settings.as_json(),
+        log=first,
+        more_logs=others,
+    )
+
+
+def distrusted(result: Result, groups: Sequence[str] = GROUPS) -> Result:
+    """The result with no status OK left in those `groups` of its estimates."""
+    changed = {}
+    for group in groups:
+        changed[group] = dict(getattr(result, group))
+        for name, one in changed[group].items():
+            if one.usable:
+                changed[group][name] = one.model_copy(update={"status": Status.IMPLAUSIBLE})
+    return result.model_copy(update=changed)
+
+
+def outcome_of(found: Fitted) -> Result:
+    """The result of a fit, but for what was noticed in its logs.
 
     Its estimates come from one solution: where one of them breaks a bound of physics by more than
     chance explains, or a joint's torque is predicted worse than its mean would, none can be
@@ -79,53 +86,36 @@ def outcome_of(found: Fitted) -> Identified:
     # a constant that the model has no column for is not identifiable
     estimates = {name: unknown(UNITS[name]) for name in CONSTANT_NAMES}
     estimates |= _estimates(fit, fit.status)
-    parameters, payload, loaded = (dict[str, Estimate]() for _ in range(3))
+    parameters, payload = dict[str, Estimate](), dict[str, Estimate]()
     for name in outside(estimates, gone):
         group = payload if name in PAYLOAD_PARAMETERS else parameters
         group[name] = estimates[name]
-    rows, stds = table_rows(fit)
-    status_of = dict(zip(fit.names, fit.status, strict=True))
-    for name, constants in LOADED_ROWS.items() if fit.shared.payload else ():
-        if not gone.isdisjoint(constants):
-            continue
-        loaded[name] = unknown(TABLE_UNITS[name])
-        if name in rows:
-            status = "OK" if fit.converged else "NOT_CONVERGED"
-            if fit.converged and "FROM_PRIOR" in map(status_of.get, constants):
-                status = "FROM_PRIOR"
-            half, unit = fit.quantile * stds[name], TABLE_UNITS[name]
-            loaded[name] = estimate(rows[name], stds[name], half, unit, status)
-    summary = fit_summary(found)
+    rows, summary = table_rows(fit), fit_summary(found)
+    loaded = {}
+    for name, constants in LOADED_ROWS.items():
+        if name in rows and gone.isdisjoint(constants):
+            loaded[name] = rows[name]
     notices = list(remarks(found))
     if settings.cross_validate and summary.cross_validation is None:
         notices.append(Notice("SHORT_LOG", numbers={"case": "validation"}))
-    outcome = Identified(
-        parameters=parameters,
-        loaded=loaded,
-        payload=payload,
-        rows=rows,
-        estimator=fit.estimator,
-        stds=stds,
-        fit=summary,
-        notices=notices + list(fit_notes(summary)),
+    result = started(found.survey, settings, rows | payload).model_copy(
+        update={
+            "estimator": fit.estimator,
+            "parameters": parameters,
+            "loaded": loaded,
+            "payload": payload,
+            "fit": summary,
+            "notices": [*notices, *fit_notes(summary)],
+        }
     )
-    judged = summary.cross_validation or summary.residual
+    judged = summary.prediction
     if "FROM_PRIOR" in fit.status:  # a prior errs by as much as it says
         judged = None
     far = any((one.distance_sigma or 0.0) > FAR_BEYOND for one in summary.broken_bounds)
     far &= "BROKEN_BOUND" not in found.survey.accepted
     if far or (judged is not None and judged.unexplained(least=0.0)):
-        return outcome.distrusted()
-    return outcome
-
-
-def distrusted(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
-    """The estimates with no status OK left."""
-    changed = dict(group)
-    for name, one in group.items():
-        if one.usable:
-            changed[name] = one.model_copy(update={"status": Status.IMPLAUSIBLE})
-    return changed
+        return distrusted(result)
+    return result
 
 
 def _estimates(fit: Fit, statuses: Sequence[str]) -> dict[str, Estimate]:
@@ -158,33 +148,31 @@ def unknown(unit: str) -> Estimate:
     )
 
 
-def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
-    """Table 4's rows and their standard deviations.
-
-    None of a parameter that is not identifiable.
-    """
-    rows: dict[str, float] = {}
-    stds: dict[str, float] = {}
+def table_rows(fit: Fit) -> dict[str, Estimate]:
+    """Table 4's rows; unknown where a constant is not identifiable, or nothing."""
+    status_of: dict[str, str] = dict(zip(fit.names, fit.status, strict=True))
+    rows: dict[str, Estimate] = {}
     kinds = [(False, UNLOADED_ROWS)]
     if fit.shared.payload:
         kinds.append((True, LOADED_ROWS))
-    unusable = set(np.array(fit.names)[np.array(fit.status) == "NOT_IDENTIFIABLE"].tolist())
     for loaded, constants_of in kinds:
         jacobian = fit.shared.jacobian(fit.values, loaded)
         coefficients = fit.shared.coefficients(fit.values, loaded)
         for name, constants in constants_of.items():
             weight = np.isin(fit.shared.log_names, constants).astype(np.float64)
-            has_columns = weight.sum() == len(constants)
-            if name in unusable or not has_columns or not set(constants).isdisjoint(fit.absent):
-                continue
-            spread = fit.spread(weight @ jacobian)
-            if np.isfinite(spread):
-                rows[name], stds[name] = float(weight @ coefficients), spread
-    if fit.shared.payload:
-        place = fit.names.index("m_p")
-        if np.isfinite(fit.std[place]):
-            rows["m_p"], stds["m_p"] = float(fit.values[place]), float(fit.std[place])
-    return rows, stds
+            known = weight.sum() == len(constants) and set(constants).isdisjoint(fit.absent)
+            known &= status_of.get(name) != "NOT_IDENTIFIABLE"
+            spread = fit.spread(weight @ jacobian) if known else np.inf
+            status = "OK"
+            if not np.isfinite(spread):
+                status = "NOT_IDENTIFIABLE"
+            elif not fit.converged:
+                status = "NOT_CONVERGED"
+            elif "FROM_PRIOR" in map(status_of.get, constants):
+                status = "FROM_PRIOR"
+            value, half = float(weight @ coefficients), fit.quantile * spread
+            rows[name] = estimate(value, spread, half, TABLE_UNITS[name], status)
+    return rows
 
 
 def fit_summary(found: Fitted) -> results.FitSummary:
@@ -362,26 +350,23 @@ def _pulled_down(fit: results.FitSummary | None, count: int) -> list[bool]:
     return down
 
 
-def result_of(outcome: Identified, settings: Settings, survey: Recordings) -> Result:
-    """The result of `outcome` on a survey's logs, the first log first."""
-    truth = survey.logs[0].origin.truth
-    payload = None
-    if survey.loaded and survey.loaded[0].origin.truth:
-        payload = survey.loaded[0].origin.truth.payload
-    fit, turned = outcome.fit, has_code(outcome.notices, "WRONG_ZERO")
+def judged(result: Result, survey: Recordings) -> Result:
+    """The result with what was noticed in its logs; distrusted where that makes it wrong."""
+    fit, turned = result.fit, has_code(result.notices, "WRONG_ZERO")
     # no likelihood stands within the bounds of physics and upright
-    doubtful = fit is None or outcome.estimator != "refined" or bool(fit.broken_bounds) or turned
+    doubtful = fit is None or result.estimator != "refined" or bool(fit.broken_bounds) or turned
     # checks, as code and case, of single logs that the fit of all of them makes more precisely
     replaced = []
     if turned:
         replaced.append("WRONG_ZERO:")
-    if settings.effort is not None:
+    if result.settings.get("effort") is not None:
         replaced.append("GRAVITY_COMPENSATED:arm")
     if not doubtful:  # in another unit no angle's sine would fit
         replaced.append("DEGREES:reach")
     down = _pulled_down(fit, len(survey.logs))
-    of_logs: list[Notice] = []
+    of_logs, other_arms, of_fit = list[Notice](), list[Notice](), result.notices
     lost, wrong = False, {"WRONG_ZERO"} if turned else set()
+    truth = survey.logs[0].origin.truth
     for log, is_down in zip(survey.logs, down, strict=True):
         for notice in survey.notices(log, doubtful=doubtful):
             if notice.key in replaced or (is_down and notice.code in _OF_GRAVITY):
@@ -391,32 +376,13 @@ def result_of(outcome: Identified, settings: Settings, survey: Recordings) -> Re
             other = notice.code == "OTHER_JOINTS" and bool(notice.numbers.get("swing", False))
             if other or notice.code in CONTRADICTED:
                 wrong.add(notice.code)
-    if has_code(of_logs, "WRONG_CONVENTION"):  # of which gravity that is turned is a part
-        kept = [one for one in outcome.notices if one.code != "WRONG_ZERO"]
-        outcome = replace(outcome, notices=kept)
-        wrong.discard("WRONG_ZERO")
-    if wrong - survey.accepted:
-        outcome = outcome.distrusted()
-    other_arms = []  # synthetic logs that another arm than the first log's made
-    for log in survey.logs:
         own = log.origin.truth
-        if truth and own and own.arm != truth.arm:
+        if truth and own and own.arm != truth.arm:  # another synthetic arm
             numbers = {"case": "metadata", "first": survey.logs[0].name}
             other_arms.append(Notice("OTHER_ARM", numbers=numbers, logs=(log.name,)))
-    summaries = [survey.summary(log) for log in survey.logs]
-    return Result(
-        version=__version__,
-        estimator=outcome.estimator or settings.estimator,
-        parameters=outcome.parameters,
-        loaded=outcome.loaded,
-        payload=outcome.payload,
-        paper_payload=outcome.paper_payload,
-        table4=table4(outcome.rows, outcome.stds, truth, payload),
-        truth=true_parameters(truth, payload),
-        fit=outcome.fit,
-        settings=settings.as_json(),
-        log=summaries[0],
-        more_logs=summaries[1:],
-        data_lost=lost,
-        notices=[*merged(of_logs), *other_arms, *outcome.notices],
-    )
+    if has_code(of_logs, "WRONG_CONVENTION"):  # of which gravity that is turned is a part
+        of_fit = [one for one in of_fit if one.code != "WRONG_ZERO"]
+        wrong.discard("WRONG_ZERO")
+    notices = [*merged(of_logs), *other_arms, *of_fit]
+    result = result.model_copy(update={"data_lost": lost, "notices": notices})
+    return distrusted(result) if wrong - survey.accepted else result

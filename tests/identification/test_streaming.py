@@ -14,7 +14,7 @@ from algid.identification import recordings as surveys
 from algid.identification.by_likelihood import choose_model, run_fit
 from algid.identification.by_paper import run_paper
 from algid.identification.open_logs import open_source
-from algid.identification.outcome import outcome_of, result_of
+from algid.identification.outcome import judged, outcome_of
 from algid.identification.recordings import Recording, Recordings
 from algid.log import Log
 from algid.results import Result
@@ -56,7 +56,7 @@ def estimates(log: Recording, settings: Settings) -> tuple[FloatArray, FloatArra
     """Estimates, by how much sums of another order may move them, and the whole result."""
     survey = Recordings([log])
     if settings.estimator == "paper":
-        result = result_of(run_paper(survey, log, None, settings), settings, survey)
+        result = judged(run_paper(survey, settings), survey)
         values = np.array([one.estimate for one in result.parameters.values()], dtype=np.float64)
         return values, 1e-9 * np.abs(values), result  # condition numbers to 1e6, times rounding
     chosen = choose_model(survey, settings)
@@ -67,7 +67,7 @@ def estimates(log: Recording, settings: Settings) -> tuple[FloatArray, FloatArra
     # rounding, times the
     # condition of the normal equations, by 1e-9 of it.
     room = np.concatenate([fit.std, fit.std]) * 1e-7
-    result = result_of(outcome_of(found), settings, survey)
+    result = judged(outcome_of(found), survey)
     return np.concatenate([fit.values, fit.std]), room, result
 
 
