@@ -153,6 +153,7 @@ class Reading:
     def _decisive(self) -> dict[str, str]:
         """What decides the estimates, by name, in words."""
         found = {"zero": self.zero, "second_angle": self.second_angle, "drive": self.drive}
+        found["passive"] = f"{self.passive or 'none'}"
         if self.joints is not None:
             found["joints"] = ",".join(self.joints)
         for name, one in self.channels.items():

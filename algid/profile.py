@@ -63,7 +63,7 @@ CHANNELS_OF: Mapping[str, tuple[str, ...]] = {
     "torque_unit": ("tau1", "tau2"),
 }
 """Settings that are the unit of each of several channels."""
-OF_ONE_LOG = ("torque_file", "segment")
+OF_ONE_LOG = ("torque_file", "segment", "start", "end")
 """Settings that no other log shares."""
 
 

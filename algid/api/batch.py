@@ -138,7 +138,7 @@ def batch(
         raise SettingError(
             f"{flag('memory_limit')}: macOS does not bound the memory of a process; leave it out"
         )
-    asked, of_profile = settings_of(settings, profile, options)
+    asked, of_profile = settings_of(settings, options)
     said = meant(profile, of_profile)
     known = None if parameters is None else opened(parameters)
     statement_of(asked)  # what cannot be read is told once
@@ -155,7 +155,7 @@ def batch(
     @cache  # each file once
     def profile_of(file: str) -> Profile | None:
         """That of a manifest's entry with the options over it."""
-        return meant(file, settings_of(None, file, options)[1])
+        return meant(file, settings_of(None, options)[1])
 
     def task_of(job: Job) -> Task:
         of_job = said

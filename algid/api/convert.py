@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Unpack
 from algid.api import Answer
 from algid.api.options import LogOptions, ProfileLike, meant, verb
 from algid.base.exits import exit_of
-from algid.notices import lossy
+from algid.notices import Notice, Remedy, lossy
+from algid.settings import DEFAULTS, OF_BOTH
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
     from algid.log import Log
-    from algid.notices import Notice
 
 
 @verb
@@ -29,7 +29,8 @@ def convert(
 ) -> list[Notice]:
     """Write a log in another format, in SI units, with canonical names.
 
-    A synthetic one keeps its truth.
+    A synthetic one keeps its truth. What is said of the arm and its driver, `gravity`, `effort` and
+    `velocity`, no log holds: give it again where the file is used.
 
     Parameters
     ----------
@@ -73,8 +74,18 @@ def convert(
     from algid.readers import open_log
     from algid.writers import write_log
 
-    reader = open_log(source, meant(profile, options))
+    own = meant(profile, options)
+    reader = open_log(source, own)
     notices: list[Notice] = []
+    left: dict[str, Any] = {}  # what samples in SI units do not hold
+    for name in OF_BOTH if own is not None else ():
+        value = getattr(own, name)
+        if value not in (DEFAULTS[name], None, "raw", "current"):  # a current is a torque by now
+            left[name] = value
+    if left:
+        numbers = {"case": "kept", "said": ", ".join(left)}
+        again = Remedy(left, "where the file is used")
+        notices.append(Notice("STATED_UNUSED", numbers=numbers, remedies=(again,)))
 
     def noted() -> Iterator[Log]:
         """The blocks; keeps their notices, and tells how far the writing has come."""

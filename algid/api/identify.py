@@ -107,7 +107,7 @@ def identify(
     from algid.api.result import Result
     from algid.identification.identify import identify as run
 
-    asked, of_profile = settings_of(settings, profile, options)
+    asked, of_profile = settings_of(settings, options)
     own, unloaded, loaded = meant(profile, of_profile, unloaded, loaded)
     if export and not report:
         raise SettingError(

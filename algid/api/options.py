@@ -46,7 +46,7 @@ from algid.options import (
     flag,
 )
 from algid.profile import Effort, Profile, load_profile, over, with_settings
-from algid.settings import OF_BOTH, Settings
+from algid.settings import DEFAULTS, OF_BOTH, Settings
 
 if TYPE_CHECKING:
     from algid.identification.open_logs import LogLike
@@ -247,7 +247,7 @@ def refuse_unknown(options: Iterable[str], known: Collection[str]) -> None:
 
 
 def settings_of(
-    settings: Settings | None, profile: ProfileLike | None, options: Mapping[str, Any]
+    settings: Settings | None, options: Mapping[str, Any]
 ) -> tuple[Settings, dict[str, Any]]:
     """The settings with options over them, as flags are over a file; and the profile's options.
 
@@ -259,11 +259,11 @@ def settings_of(
     refuse_unknown(options, Options.__annotations__)
     own = {name: options[name] for name in options if name in Settings.model_fields}
     of_profile = {name: options[name] for name in options if name not in own}
-    of_both = {name: own[name] for name in OF_BOTH if name in own}
-    # a driver's effort says how its torques are read, gravity alone says nothing of a log
-    if profile is not None or of_profile or of_both.keys() - {"gravity"}:
-        of_profile |= of_both
-    return (settings or Settings()).but(**own), of_profile
+    asked = (settings or Settings()).but(**own)
+    for name in OF_BOTH:
+        if name in own or getattr(asked, name) != DEFAULTS[name]:
+            of_profile[name] = getattr(asked, name)
+    return asked, of_profile
 
 
 def meant(profile: ProfileLike | None, options: Mapping[str, Any], *logs: Any) -> Any:

@@ -88,7 +88,7 @@ def validate(
     >>> algid.validate(result, log.part(2000, 4001)).total.r2[0] > 0.999
     True
     """
-    from algid.identification.known import reused
+    from algid.identification.known import as_logged, reused
     from algid.identification.open_logs import open_sources, read_otherwise
     from algid.identification.recordings import Recordings
     from algid.identification.urdf import read_urdf
@@ -105,10 +105,11 @@ def validate(
         return Validated(judged=judged)
     known, file = None, called(result)
     if not isinstance(result, Result) and Path(result).suffix == ".urdf":
-        model = read_urdf(Path(result))
+        model = read_urdf(Path(result), own)
     else:
         known = opened(result)
-        model, own = predictor_of(known, file), reused(own, known)
+        own = reused(own, known, file)
+        model = predictor_of(as_logged(known, own), file)
     gravity = model.model.gravity
     survey = Recordings(open_sources(logs, loaded, own, gravity), progress)
     survey.begin("prediction")

@@ -85,7 +85,7 @@ def choose_model(
         asked, hold_by = Settings.of(earlier.settings).torque_hold, "parameters"
     hold: Hold = "zoh" if asked == "zoh" else "foh"
     if settings.chooses and earlier is not None:
-        model = model_of(earlier)
+        model = replace(model_of(earlier), gravity=settings.gravity)
         chosen = _given(model, model.terms + within(DELAYS, earlier.parameters))
         chosen = replace(chosen, chosen_by="parameters")
     elif not (settings.chooses or by_logs or needs_shape(settings.terms)):

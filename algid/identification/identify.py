@@ -135,7 +135,7 @@ def identify(
     earlier = Earlier.of(parameters)
     meaning = profile
     if earlier is not None:
-        meaning = reused(profile, earlier.result)
+        meaning = reused(profile, earlier.result, earlier.file)
     settings = _with_meaning(settings, meaning, earlier)
     sources = open_sources(unloaded, loaded, meaning, settings.gravity, settings.effort)
     survey = Recordings(sources, progress)
@@ -189,7 +189,6 @@ def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier 
                 f"{flag('prior')}: the arm is known by {flag('parameters')}; leave one of them out"
             )
         names = OF_BOTH
-        stated["effort"] = earlier.result.settings.get("effort")
     if meaning is not None:
         for name in meaning.model_fields_set.intersection(names):
             stated[name] = getattr(meaning, name)

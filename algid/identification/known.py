@@ -10,7 +10,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.base.criteria import SAME_LENGTH
-from algid.base.errors import ResultError
+from algid.base.errors import ResultError, SettingError
 from algid.base.names import outside, vector, within
 from algid.base.significance import CERTAIN, sigmas
 from algid.estimators.combine import Prior
@@ -33,7 +33,7 @@ from algid.notices import Notice
 from algid.options import flag
 from algid.physics.effort import absent
 from algid.results import Result
-from algid.settings import Settings
+from algid.settings import DEFAULTS, Settings
 from algid.signals.shift import TorqueShift
 
 if TYPE_CHECKING:
@@ -54,12 +54,36 @@ def model_of(result: Result) -> Model:
     return Model(tuple(model.terms), settings.gravity, model.coulomb_speed, model.stribeck_speed)
 
 
-def reused(profile: Profile | None, earlier: Result) -> Profile | None:
-    """The user's profile of the logs, completed by the profile of the earlier result."""
-    from algid.profile import OF_ONE_LOG, over
+def reused(profile: Profile | None, earlier: Result, file: str) -> Profile:
+    """The user's profile of the logs, completed by what was said of those of the earlier result.
+
+    Raises
+    ------
+    SettingError
+        If another gravity is stated than that of the earlier result, whose `file` is named.
+    """
+    from algid.profile import OF_ONE_LOG, Profile, over
 
     known = {name: one for name, one in earlier.profile.items() if name not in OF_ONE_LOG}
-    return over(profile, known)
+    settings = Settings.of(earlier.settings)  # as its logs showed them
+    for name in ("gravity", "effort"):
+        if (shown := getattr(settings, name)) != DEFAULTS[name] or name in known:
+            known[name] = shown
+    meant = over(profile, known) or Profile()
+    # of a driver that compensates the weights of arm and payload nothing has any
+    weightless = meant.effort == "gravity-compensated" and meant.gravity == 0
+    if meant.gravity != settings.gravity and not weightless:
+        raise SettingError(
+            f"{flag('gravity')}: {file} has its arm under {settings.gravity:g} m/s², found "
+            f"{meant.gravity:g}; leave it out, or identify the arm anew"
+        )
+    return meant
+
+
+def as_logged(result: Result, profile: Profile) -> Result:
+    """The result with the effort and the gravity that a profile states of the logs to predict."""
+    stated = {"effort": profile.effort, "gravity": profile.gravity}
+    return result.model_copy(update={"settings": result.settings | stated})
 
 
 def shift_of(result: Result) -> TorqueShift:

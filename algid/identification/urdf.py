@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,8 @@ from algid.base.text import counted
 from algid.identification.recordings import Role
 from algid.identification.series import Predictor
 from algid.model import SINES, TERMS, Model
+from algid.physics.effort import absent
+from algid.profile import Profile
 
 GRAVITY = 9.81
 _PARALLEL = 1e-3  # sine of the angle between axes that count as one direction
@@ -49,9 +52,14 @@ def arm_of(path: Path) -> tuple[Arm, tuple[float, ...]]:
         ) from error
 
 
-def read_urdf(path: Path) -> Predictor:
-    """The model of a URDF file for logs of the arm without payload; raises as `arm_of`."""
+def read_urdf(path: Path, profile: Profile | None = None) -> Predictor:
+    """The model of a URDF file for logs of the arm without payload; raises as `arm_of`.
+
+    A profile says under what gravity they were, and what of the torque they hold.
+    """
+    profile = profile or Profile()
     arm, friction = arm_of(path)
+    arm = replace(arm, g=arm.g * profile.gravity / GRAVITY)  # g is of the share in its plane
     jump = next(term for term in TERMS.values() if term.friction)
     terms = [jump.name] if any(friction) else []
     if max(abs(arm.delta1), abs(arm.delta2)) > _BESIDE:
@@ -59,6 +67,7 @@ def read_urdf(path: Path) -> Predictor:
     model = Model(tuple(terms), gravity=arm.g)
     value = {f"k{number}": float(k) for number, k in enumerate(arm.constants(), start=1)}
     value |= dict(zip((*SINES, *jump.names), (*map(float, arm.sines()), *friction), strict=True))
+    value |= dict.fromkeys(absent(profile.effort, model.names), 0.0)
     c = np.array([value[name] for name in model.names])
 
     def coefficients(role: Role) -> FloatArray:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from algid.base.text import ABSENT, file_name, visible
 from algid.estimators.prediction import CUTOFF, FILTER, PredictionScore, score
 from algid.estimators.rollout import HORIZONS, RolloutScore, rollouts
-from algid.identification.known import model_of, reused, shift_of, torque_constants
+from algid.identification.known import as_logged, model_of, reused, shift_of, torque_constants
 from algid.identification.open_logs import LogLike, open_source
 from algid.identification.recordings import Recordings, Role
 from algid.identification.series import Predictor, torque_blocks
@@ -195,8 +195,10 @@ def predicted(result: Result, log: LogLike, role: Role, profile: Profile | None)
     """Motion, measured and predicted torque of a log: see `algid.Result.predict`."""
     import polars as pl
 
-    known = predictor_of(result, result.log.path)
-    source = open_source(log, role, reused(profile, result), known.model.gravity)
+    file = result.log.path
+    profile = reused(profile, result, file)
+    known = predictor_of(as_logged(result, profile), file)
+    source = open_source(log, role, profile, known.model.gravity)
     blocks = list(torque_blocks(Recordings([source]), known))
     if not blocks:
         return pl.DataFrame()

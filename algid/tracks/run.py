@@ -13,7 +13,7 @@ from algid.base.errors import LogError
 from algid.base.files import read_whole
 from algid.base.runtime import one_blas_thread
 from algid.estimators.problem import TooShortError
-from algid.identification.known import contradictions, reused
+from algid.identification.known import as_logged, contradictions, reused
 from algid.identification.open_logs import LogLike, open_source, read_otherwise
 from algid.identification.recordings import Recordings
 from algid.notices import Notice, lossy, merged
@@ -63,14 +63,13 @@ def track_log(
         file, called = Path(parameters), str(parameters)
         result = read_result(file)
         content = read_whole(file / "result.json" if file.is_dir() else file)
-    source = open_source(
-        log, "loaded", reused(profile, result), result.settings.get("gravity", 9.81), changing=True
-    )
+    profile = reused(profile, result, called)
+    source = open_source(log, "loaded", profile, profile.gravity, changing=True)
     survey = Recordings([source])
     first = next(survey.segments(source), None)
     if first is None:
         raise LogError(f"{source.name}: it holds no samples; record longer")
-    arm, covariance = arm_of(result, first, l1, l2)
+    arm, covariance = arm_of(as_logged(result, profile), first, l1, l2)
     try:
         with one_blas_thread():
             weighed = track(partial(survey.segments, source), arm, covariance)
