@@ -8,7 +8,7 @@ import pytest
 
 from algid.base.errors import SettingError
 from algid.batches.discover import jobs_of
-from algid.designs.request import request
+from algid.designs.limits import request
 from algid.profile import load_profile
 from algid.synth.cases import load_case
 

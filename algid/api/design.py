@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,7 +27,7 @@ from algid.results import Result
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
-    from algid.designs.write import Planned
+    from algid.designs.campaign import Planned
 
 UNIT = "steps"
 """What progress counts."""
@@ -150,10 +151,10 @@ def design(
     []
     """
     from algid.base.runtime import one_blas_thread
-    from algid.designs.campaign import plan
-    from algid.designs.prior import PriorKnowledge, prior_of
-    from algid.designs.request import Request, campaign_of, noise_of, request
-    from algid.designs.write import Planned, write_design
+    from algid.designs.campaign import campaign_of, plan
+    from algid.designs.limits import Request, request
+    from algid.designs.prior import PriorKnowledge, noise_for, prior_of
+    from algid.designs.write import write_design
     from algid.log import Log
     from algid.readers import read_log
 
@@ -172,11 +173,11 @@ def design(
         log: Any = noise_from
         if log is not None and not isinstance(log, Log):
             log = read_log(log)
-        noise = noise_of(known, position_noise, torque_noise, log)
+        noise = noise_for(known, position_noise, torque_noise, log)
         campaign = campaign_of(known, asked, noise, for_, margin, seed)
         if progress is not None:
             progress("searching", 0, 0)
-        planned = Planned(plan(campaign, progress), source, command, names, known.doubts)
+        planned = plan(replace(campaign, joints=names, command=command), progress)
         if temporary is not None:
             write_design(planned, temporary)
     return planned
@@ -184,9 +185,11 @@ def design(
 
 def answer(planned: Planned, given: Mapping[str, Any]) -> Answer:
     """The plan; 3 where a parameter stays open."""
+    from algid.designs.write import design_document, design_json
+
     return Answer(
-        (one.document() for one in [planned]),
-        planned.as_json,
+        map(design_document, [planned]),
+        lambda: design_json(planned),
         [f"wrote {folder_of(given['prior'], given['out'])}"],
         exit=exit_of(failed=bool(planned.open_parameters), lost=False),
     )

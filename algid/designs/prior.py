@@ -12,6 +12,7 @@ from algid.base.errors import ResultError, SettingError
 from algid.base.names import outside, vector
 from algid.base.significance import SURE
 from algid.designs.belief import Belief
+from algid.estimators.noise import first_guess
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.known import (
@@ -23,6 +24,7 @@ from algid.identification.known import (
     with_error_bar,
     wrong_inertia,
 )
+from algid.log import Log
 from algid.model import DELAYS, SINES, TERMS, Model
 from algid.notices import Notice
 from algid.options import flag
@@ -231,3 +233,33 @@ def _of_result(
     belief = Belief(shared, mean, spread, box=False)
     reach = np.array([value.get("l1", np.nan), value.get("l2", np.nan)])
     return PriorArm(source, belief, reach, noise_of(result), doubts)
+
+
+def noise_for(
+    prior: PriorArm, position: float | None, torque: float | None, log: Log | None
+) -> NoiseLevels:
+    """Noise that is given, else of a log, else of the logs behind the prior.
+
+    Raises
+    ------
+    SettingError
+        Where none is known.
+    """
+    measured = prior.noise
+    if log is not None:
+        measured = first_guess(log.theta, log.tau)
+    levels = {}
+    for option, given, name in (
+        ("position_noise", position, "theta"),
+        ("torque_noise", torque, "tau"),
+    ):
+        if given is not None:
+            levels[name] = np.full(2, given)
+        elif measured is not None and np.all(getattr(measured, name) > 0):
+            levels[name] = getattr(measured, name)
+        else:
+            raise SettingError(
+                f"{flag(option)}: {prior.source} does not tell how noisy the sensors are; give it, "
+                f"or {flag('noise_from')}=LOG"
+            )
+    return NoiseLevels(**levels)

@@ -22,8 +22,7 @@ from algid.base.errors import SettingError
 from algid.batches.jobs import Job, JobRecord, JobStatus
 from algid.batches.run import Batch, Batched
 from algid.cli.output import shown
-from algid.designs.prior import PriorKnowledge, prior_of
-from algid.designs.request import noise_of
+from algid.designs.prior import PriorKnowledge, noise_for, prior_of
 from algid.estimators.whitening import NoiseLevels
 from tests.cli.commands import call
 
@@ -259,7 +258,7 @@ def prior() -> Any:
 
 
 def test_noise_is_the_flags_then_a_logs_then_the_results(tmp_path: Path) -> None:
-    by_flags = noise_of(prior(), 1e-3, 2e-2, None)
+    by_flags = noise_for(prior(), 1e-3, 2e-2, None)
     assert (by_flags.theta.tolist(), by_flags.tau.tolist()) == ([1e-3, 1e-3], [2e-2, 2e-2])
     synthetic(
         tmp_path,
@@ -273,18 +272,18 @@ def test_noise_is_the_flags_then_a_logs_then_the_results(tmp_path: Path) -> None
         "2",
     )
     log = algid.read_log(tmp_path / "case1-unloaded.csv")
-    measured = noise_of(prior(), None, None, log)
+    measured = noise_for(prior(), None, None, log)
     # a first guess from differences: to a fifth or so
     assert measured.theta == pytest.approx(1e-3, rel=0.3)
     assert measured.tau == pytest.approx(2e-2, rel=0.3)
-    mixed = noise_of(prior(), 5e-3, None, log)
+    mixed = noise_for(prior(), 5e-3, None, log)
     assert mixed.theta.tolist() == [5e-3, 5e-3]
     assert mixed.tau.tolist() == measured.tau.tolist()
     known = SimpleNamespace(
         source="arm", noise=NoiseLevels(np.full(2, 3e-4), np.array([0.1, np.nan]))
     )
-    assert noise_of(known, None, 0.2, None).theta.tolist() == [3e-4, 3e-4]  # type: ignore[arg-type]
+    assert noise_for(known, None, 0.2, None).theta.tolist() == [3e-4, 3e-4]  # type: ignore[arg-type]
     with pytest.raises(
         SettingError, match=r"^--torque-noise: arm does not tell how noisy the sensors are; give it"
     ):
-        noise_of(known, None, None, None)  # type: ignore[arg-type]
+        noise_for(known, None, None, None)  # type: ignore[arg-type]

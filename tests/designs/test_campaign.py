@@ -16,11 +16,11 @@ from algid import __version__
 from algid.arm import inverse_dynamics
 from algid.base.errors import AlgidError
 from algid.designs.belief import objective_of
-from algid.designs.campaign import Campaign, Design, plan
+from algid.designs.campaign import Campaign, Planned, plan
 from algid.designs.information import Experiment
+from algid.designs.limits import limits_of, request
 from algid.designs.prior import PriorKnowledge, prior_of
-from algid.designs.request import limits_of, request
-from algid.designs.write import Planned
+from algid.designs.write import design_json
 from algid.estimators.whitening import NoiseLevels
 from algid.notices import Notice
 from algid.readers import read_log
@@ -54,7 +54,7 @@ DURATION = 2.0
 def one_start() -> Iterator[None]:
     """A short search: what it finds is good enough to be judged here."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("algid.designs.optimise.STARTS", 1)
+        patch.setattr("algid.designs.search.STARTS", 1)
         yield
 
 
@@ -70,11 +70,11 @@ def campaign(names: list[str] | None = None) -> Campaign:
 
 
 @pytest.fixture(scope="module")
-def design() -> Design:
+def design() -> Planned:
     return plan(campaign())
 
 
-def test_no_limit_breaks_for_any_arm_that_is_believed_possible(design: Design) -> None:
+def test_no_limit_breaks_for_any_arm_that_is_believed_possible(design: Planned) -> None:
     limits, motion, belief = design.campaign.limits, design.motion, design.campaign.belief
     assert np.all(motion.theta >= limits.low[:, None])
     assert np.all(motion.theta <= limits.high[:, None])
@@ -89,20 +89,26 @@ def test_no_limit_breaks_for_any_arm_that_is_believed_possible(design: Design) -
             assert np.all(np.abs(torque) <= limits.torque[:, None])
 
 
-def test_what_is_asked_for_is_what_becomes_certain(design: Design) -> None:
+def test_what_is_asked_for_is_what_becomes_certain(design: Planned) -> None:
     payload = plan(campaign(["m_p"]))
     place = design.names.index("m_p")
     assert payload.relative[place] < 0.9 * design.relative[place]
     assert payload.largest == payload.relative[place]
 
 
-def test_the_json_holds_what_decides_and_what_is_predicted(design: Design) -> None:
+def test_the_json_holds_what_decides_and_what_is_predicted(design: Planned) -> None:
     limits = replace(design.campaign.limits, acceleration=np.full(2, np.inf), height=-np.inf)
     asked = replace(design.campaign.asked, known=np.arange(10) != 6)
-    changed = replace(design, campaign=replace(design.campaign, limits=limits, asked=asked))
-    doubts = (Notice("DOUBT", "something"),)
-    planned = Planned(changed, "arm.algid", "algid design arm.algid", ("a", "b"), doubts)
-    content = json.loads(planned.as_json())
+    decided_by = replace(
+        design.campaign,
+        limits=limits,
+        asked=asked,
+        source="arm.algid",
+        doubts=(Notice("DOUBT", "something"),),
+        joints=("a", "b"),
+        command="algid design arm.algid",
+    )
+    content = json.loads(design_json(replace(design, campaign=decided_by)))
     decided = ("prior", "command", "drive", "duration", "rate", "seed", "interrupted", "gravity")
     assert [content[name] for name in (*decided, "version", "joints", "runs")] == [
         *("arm.algid", "algid design arm.algid", "position", 2.0, 500.0, 0, False, 9.81),

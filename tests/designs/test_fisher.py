@@ -7,7 +7,7 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.designs.information import Experiment, Information, Sensitivities
-from algid.designs.position import Fourier, middles
+from algid.designs.search import Fourier, middles
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model, Motion, torque

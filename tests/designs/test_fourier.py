@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 
 from algid.arm import FloatArray
-from algid.designs.position import Fourier
+from algid.designs.search import Fourier
 
 
 def by_sympy(wave: str) -> list[Callable[..., FloatArray]]:

@@ -11,8 +11,8 @@ from algid.arm import FloatArray, inverse_dynamics
 from algid.designs.belief import Belief, Objective
 from algid.designs.information import Experiment, Information, Sensitivities
 from algid.designs.limits import Limits, usage
-from algid.designs.position import Fourier, middles
 from algid.designs.prior import PriorKnowledge, prior_of
+from algid.designs.search import Fourier, middles
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Motion
 from pipelines.cramer_rao import Truth, joint_bound

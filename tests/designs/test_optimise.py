@@ -7,7 +7,8 @@ import pytest
 from scipy.special import logsumexp
 
 from algid.arm import FloatArray
-from algid.designs.optimise import (
+from algid.designs.campaign import Campaign
+from algid.designs.search import (
     FIRST,
     KEPT,
     LATER,
@@ -18,10 +19,9 @@ from algid.designs.optimise import (
     optimise,
     soft_maximum,
 )
-from algid.designs.position import PositionProblem
 
 
-class Ball(PositionProblem):
+class Ball(Campaign):
     """The point of the box |x| ≤ 1 nearest to `target`: the target with its coordinates clipped."""
 
     def __init__(self, target: FloatArray) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from algid.base.errors import SettingError
-from algid.designs.request import limits_of, request
+from algid.designs.limits import limits_of, request
 from algid.options import flag
 
 LENGTHS = np.array([0.4, 0.3])
