@@ -102,7 +102,7 @@ def track(
     """
     from algid.log import Log
     from algid.tracks.page import track_folder, write_track
-    from algid.tracks.run import track_log
+    from algid.tracks.payload import track_log
 
     own, log = meant(profile, options, log)
     name = str(log) if isinstance(log, str | Path) else "log"

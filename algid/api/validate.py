@@ -90,8 +90,8 @@ def validate(
     """
     from algid.identification.known import as_logged, reused
     from algid.identification.open_logs import open_sources, read_otherwise
+    from algid.identification.prior import read_urdf
     from algid.identification.recordings import Recordings
-    from algid.identification.urdf import read_urdf
     from algid.identification.validate import Validated, predictor_of
     from algid.identification.validate import validate as predicted
 

@@ -21,14 +21,14 @@ from algid.arm import FloatArray
 from algid.base.errors import ResultError
 from algid.exports.links import Knowns, Link, links_of, turn_of
 from algid.identification.known import (
+    by_constants,
     contradictions,
     covariance_of,
-    first_length,
     given_lengths,
-    has_error_bar,
     model_of,
     payload_length,
     torque_constants,
+    with_error_bar,
     wrong_inertia,
 )
 from algid.model import K1, K2, SINE_OF, Model, length_by_coupling, phasor
@@ -124,10 +124,10 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
         by_payload = payload_length(result)
         if by_payload is not None:
             l1, told = by_payload[0], " with the payload"
-        by = by_payload or first_length(result)
+        by = by_payload or by_constants(result)
         told += "" if by is None else f", ± {result.quantile * by[1]:.2g} (95 %)"
     c = torque_constants(result, model, "unloaded", file)
-    sure = [name for name in model.names if has_error_bar(result, name)]
+    sure = with_error_bar(result, model.names)
     C = covariance_of(result, model.names, sure)
     conditioned = l1 is not None and model.gravity > 0
     if l1 is not None and conditioned:

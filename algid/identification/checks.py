@@ -80,8 +80,7 @@ from algid.settings import Settings
 
 STEEL, AIR = 8000.0, 1.2  # kg/m³
 LEAST_SURE = 10.0  # standard deviations that a length has to have
-MOST = 0.5
-"""R² below which most of a torque is not the model's."""
+MOST = 0.5  # R² below which most of a torque is not the model's
 
 
 def doubted(found: Fitted) -> Fitted:
@@ -191,11 +190,13 @@ def _of_phases(found: Fitted) -> Iterator[Notice]:
     fit = found.fit
     if set(SINES).isdisjoint(fit.names) or (fit.shrinkage is not None and not bent(fit)):
         return
-    numbers = {"case": "no gravity", "second": _in_degrees(*_angle(fit, K1))}
+    numbers, angles = {"case": "no gravity"}, dict[str, tuple[str, ...]](second=(K1,))
     if {K2, K4} <= set(fit.names) - set(fit.absent):
         numbers["case"] = "gravity"
-        numbers["first"] = _in_degrees(*_angle(fit, K2, K1))
-        numbers["load"] = _in_degrees(*_angle(fit, K4, K2, K1))
+        angles |= {"first": (K2, K1), "load": (K4, K2, K1)}
+    for name, moments in angles.items():
+        angle, half = np.degrees(_angle(fit, *moments))
+        numbers[name] = f"{angle:.3g}° ± {half:.2g}°"
     yield Notice("PHASES", numbers=numbers)
 
 
@@ -214,12 +215,7 @@ def _of_mass(found: Fitted) -> Iterator[Notice]:
     mass = abs(float(fit.values[fit.names.index(K4)])) / (fit.shared.model.gravity * length)
     if mass > STEEL * length**3:
         remedies: tuple[Remedy, ...] = ()
-        if (
-            unit is not None
-            and fit.prior is None
-            and fit.converged
-            and not list(broken_bounds(fit))
-        ):
+        if unit is not None and fit.prior is None and fit.converged and not broken_bounds(fit):
             lighter = mass * TORQUE["mN m"] / unit
             if AIR * length**3 <= lighter <= STEEL * length**3:
                 remedies = (Remedy({"torque_unit": "mN m"}, "where torques are in mN m"),)
@@ -407,10 +403,6 @@ def _angle(fit: Fit, *names: str) -> tuple[float, float]:
     # beside its own value no angle is cut at half a turn
     _, std = measured(fit, lambda beta: float(np.angle(product(beta) * found.conjugate())))
     return float(np.angle(found)), fit.quantile * std
-
-
-def _in_degrees(angle: float, half: float) -> str:
-    return f"{np.degrees(angle):.3g}° ± {np.degrees(half):.2g}°"
 
 
 LONGEST, BOTH_LONG = 5.0, 2.0

@@ -25,7 +25,6 @@ from algid.model import (
     SINE_OF,
     Model,
     length_by_coupling,
-    moments_of,
     phasor_of,
     without_delay,
 )
@@ -182,16 +181,11 @@ def wrong_inertia(values: Mapping[str, float]) -> str | None:
     )
 
 
-def has_error_bar(result: Result, name: str) -> bool:
-    """Whether an estimate is sound and the result's covariance holds it."""
-    estimate = result.estimates.get(name)
-    ok = estimate is not None and estimate.usable and estimate.std is not None
-    return ok and result.fit is not None and name in result.fit.covariance_names
-
-
 def with_error_bar(result: Result, names: Iterable[str]) -> tuple[str, ...]:
-    """Those of the names whose estimate `has_error_bar`, in order."""
-    return tuple(name for name in names if has_error_bar(result, name))
+    """Those of the names whose estimate is sound, and in the result's covariance, in order."""
+    known = () if result.fit is None else result.fit.covariance_names
+    sound = {name for name, one in result.estimates.items() if one.usable and one.std is not None}
+    return within(names, sound.intersection(known))
 
 
 def covariance_of(result: Result, names: Sequence[str], uncertain: Collection[str]) -> FloatArray:
@@ -212,8 +206,8 @@ def covariance_of(result: Result, names: Sequence[str], uncertain: Collection[st
     return covariance
 
 
-def by_constants(result: Result) -> tuple[float, dict[str, float]] | None:
-    """l1 = g |K1| / |K2| in m and its derivatives by the constants.
+def by_constants(result: Result) -> tuple[float, float, dict[str, float]] | None:
+    """l1 = g |K1| / |K2| and its standard deviation in m, and its derivatives by the constants.
 
     None if the result leaves it open.
 
@@ -222,38 +216,27 @@ def by_constants(result: Result) -> tuple[float, dict[str, float]] | None:
     """
     gravity = Settings.of(result.settings).gravity
     names = with_error_bar(result, (K1, K2, SINE_OF[K1], SINE_OF[K2]))
-    if not gravity or not {K1, K2} <= set(names):
-        return None
     value = {name: result.parameters[name].estimate or 0.0 for name in names}
-    l1 = length_by_coupling(value, gravity)
-    if l1 is None:
+    l1 = length_by_coupling(value, gravity) if {K1, K2} <= set(names) else None
+    if l1 is None or result.fit is None:
         return None
-    first, second, _ = moments_of(value)
     slopes = {}
-    for name, moment, power in ((K1, first, 1), (K2, second, -1)):
+    for name, power in ((K1, 1), (K2, -1)):
+        moment = phasor_of(value, name)
         slopes[name] = power * l1 * moment.real / abs(moment) ** 2
         slopes[SINE_OF[name]] = power * l1 * moment.imag / abs(moment) ** 2
-    return l1, {name: slopes[name] for name in names}
-
-
-def first_length(result: Result) -> tuple[float, float] | None:
-    """l1 = g |K1| / |K2| and its standard deviation, in m; None if the result leaves it open."""
-    length_and_slopes = by_constants(result)
-    if length_and_slopes is None or result.fit is None:
-        return None
-    l1, slopes = length_and_slopes
-    covariance = result.fit.covariance_of(list(slopes))
-    slope = np.fromiter(slopes.values(), dtype=np.float64)
-    return l1, float(np.sqrt(slope @ covariance @ slope))
+    slope = vector(names, slopes)
+    std = float(np.sqrt(slope @ result.fit.covariance_of(names) @ slope))
+    return l1, std, {name: slopes[name] for name in names}
 
 
 def payload_length(result: Result) -> tuple[float, float] | None:
-    """The payload's l1 and its standard deviation in m, if more precise than `first_length`."""
+    """The payload's l1 and its standard deviation in m, if more precise than `by_constants`."""
     l1 = result.payload.get("l1")
     if l1 is None or l1.estimate is None or not l1.std or not l1.usable:
         return None
-    by_constants = first_length(result)
-    if by_constants is not None and by_constants[0] > 0 and by_constants[1] <= l1.std:
+    other = by_constants(result)
+    if other is not None and other[0] > 0 and other[1] <= l1.std:
         return None
     return l1.estimate, l1.std
 
@@ -263,7 +246,7 @@ def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice
 
     What it identified are the payload's lengths, or l1 = g k1 / k2.
     """
-    stated, by_constants = given_lengths(result), first_length(result)
+    stated, of_arm = given_lengths(result), by_constants(result)
     notices = []
     for name, given in lengths.items():
         numbers = {"name": name, "given": given}
@@ -274,8 +257,8 @@ def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice
             continue
         own = result.payload.get(name)
         estimate, std = (None, None) if own is None else (own.estimate, own.std)
-        if name == "l1" and by_constants is not None:
-            estimate, std = by_constants
+        if name == "l1" and of_arm is not None:
+            estimate, std, _ = of_arm
         if estimate is None or not std:
             continue
         if said := contradicting(name, given, estimate, std, result.quantile):

@@ -1,4 +1,4 @@
-"""What CAD or an earlier result says of k1 … k5: a normal prior, beside which logs are evidence.
+"""What CAD, read from URDF, or an earlier result says of k1 … k5: a prior beside evidence of logs.
 
 Masses m, centres of mass l_c, inertias I and link 1's length of a drawing are wrong by independent
 shares. With D the derivatives of the constants by them and σ their errors, by Table 1,
@@ -8,6 +8,10 @@ shares. With D the derivatives of the constants by them and σ their errors, by 
     P = D diag(σ²) Dᵀ,   σ_m = e m,   σ_I = e I,   σ_lc = e max(|lc|, √(I / m)),   σ_l1 = 0.01 l1
 
 A balanced link's centre may be off as well, by as large a share of its radius of gyration.
+
+**A drawing** is a URDF file. Two joints about one direction move; what is fixed to a link counts to
+it. θ1 is the angle of the line from joint 1 to joint 2 over the horizontal, θ2 that of link 2's
+line: to the tip, which is the last frame fixed to it, or, without one, to its centre of mass.
 
 **Logs and prior.** With W the covariance of the logs' estimates c of these constants and B a basis
 of the combinations that they determine, their information is J, and both together say
@@ -30,6 +34,8 @@ k, V    what both say, its covariance          (n, n)
 
 from __future__ import annotations
 
+import math
+import xml.etree.ElementTree as ET
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -38,17 +44,21 @@ import numpy as np
 from algid.arm import Arm, FloatArray
 from algid.base.criteria import SAME_LENGTH, STILL
 from algid.base.errors import ResultError, SettingError
-from algid.base.names import outside, places_outside, vector
+from algid.base.files import read_text
+from algid.base.names import outside, places_outside, vector, within
 from algid.base.significance import LEVEL, chance
+from algid.base.text import counted
 from algid.estimators.combine import likelihood, scaled_pinv
 from algid.estimators.fit import Fit
 from algid.estimators.identifiability import SHARE, open_directions
 from algid.identification.known import covariance_of, with_error_bar
-from algid.identification.urdf import arm_of
-from algid.model import RIGID, UNITS
+from algid.identification.recordings import Role
+from algid.identification.series import Predictor
+from algid.model import RIGID, SINES, TERMS, UNITS, Model
 from algid.notices import Notice
 from algid.options import flag
 from algid.physics.effort import absent
+from algid.profile import Profile
 from algid.results import read_result
 from algid.settings import Settings
 
@@ -201,3 +211,187 @@ def _determined(fit: Fit, places: list[int], doubtful: list[bool]) -> FloatArray
     own = [free.index(place) for place in places]
     lost, share, _ = np.linalg.svd(np.hstack([null[own], np.diag(np.array(doubtful, float))]))
     return lost[:, np.count_nonzero(share > SHARE) :] / size[own][:, None]
+
+
+GRAVITY = 9.81
+_PARALLEL = 1e-3  # sine of the angle between axes that count as one direction
+_ROUNDING = 1e-12  # m: a link this long has no length
+_ASTRAY = "there is no link {}, or none that it hangs on, or two"
+_BESIDE = 1e-9  # rad: a centre of mass less off its link's line is on it
+
+
+def arm_of(path: Path) -> tuple[Arm, tuple[float, ...]]:
+    """The arm of a URDF file, and its joints' Coulomb friction in N m.
+
+    Raises
+    ------
+    ResultError
+        If it is no URDF of an arm with two joints about one direction.
+    """
+    try:
+        return _arm(ET.fromstring(read_text(path)))
+    except OSError as error:
+        raise ResultError(
+            f"{path}: cannot read it ({error.strerror}); expected a URDF file"
+        ) from error
+    except (ET.ParseError, UnicodeDecodeError) as error:
+        raise ResultError(f"{path}: not XML ({error}); expected a URDF file") from error
+    except ValueError as error:
+        raise ResultError(
+            f"{path}: expected a URDF of an arm with two parallel joints: {error}; mend the file"
+        ) from error
+
+
+def read_urdf(path: Path, profile: Profile | None = None) -> Predictor:
+    """The model of a URDF file for logs of the arm without payload; raises as `arm_of`.
+
+    A profile says under what gravity they were, and what of the torque they hold.
+    """
+    profile = profile or Profile()
+    arm, friction = arm_of(path)
+    arm = replace(arm, g=arm.g * profile.gravity / GRAVITY)  # g is of the share in its plane
+    jump = next(term for term in TERMS.values() if term.friction)
+    terms = [jump.name] if any(friction) else []
+    if max(abs(arm.delta1), abs(arm.delta2)) > _BESIDE:
+        terms += [name for name, term in TERMS.items() if term.sines]
+    model = Model(tuple(terms), gravity=arm.g)
+    value = {f"k{number}": float(k) for number, k in enumerate(arm.constants(), start=1)}
+    value |= dict(zip((*SINES, *jump.names), (*map(float, arm.sines()), *friction), strict=True))
+    value |= dict.fromkeys(absent(profile.effort, model.names), 0.0)
+    c = np.array([value[name] for name in model.names])
+
+    def coefficients(role: Role) -> FloatArray:
+        if role == "loaded":
+            raise ResultError(
+                f"{path}: a URDF file tells no payload; judge it on logs of the arm without one"
+            )
+        return c
+
+    return Predictor(model, coefficients)
+
+
+def _arm(robot: ET.Element) -> tuple[Arm, tuple[float, ...]]:
+    """The arm, and its joints' Coulomb friction in N m.
+
+    Raises
+    ------
+    ValueError
+        If the robot is no such arm.
+    """
+    links = {_text(link, "", "name"): link for link in robot.findall("link")}
+    joints: dict[str, ET.Element] = {}  # by the link that hangs on it
+    parent: dict[str, str] = {}
+    for one in robot.findall("joint"):
+        child, parent_of = _text(one, "child", "link"), _text(one, "parent", "link")
+        lost = [name for name in (child, parent_of) if name not in links or child in joints]
+        if lost:
+            raise ValueError(_ASTRAY.format(lost[0]))
+        joints[child], parent[child] = one, parent_of
+    kind = {name: _text(one, "", "type") for name, one in joints.items()}
+    names = [name for name, word in kind.items() if word != "fixed"]
+    if len(names) != 2 or not {kind[name] for name in names} <= {"revolute", "continuous"}:
+        raise ValueError(f"found {counted(len(names), 'moving joint')}, or not all of them turn")
+    # a link's frame in the base's where both angles are 0, and how many of the moving joints it is
+    # behind
+    frames, behind = dict[str, FloatArray](), dict[str, int]()
+    for link in sorted(links):
+        path = [link]
+        frame: FloatArray = np.eye(4)
+        while path[-1] in parent:
+            frame = _origin(joints[path[-1]], "origin") @ frame
+            path.append(parent[path[-1]])
+            if len(path) > len(links):
+                raise ValueError(_ASTRAY.format(link))
+        frames[link], behind[link] = frame, len(within(names, path))
+    names.sort(key=behind.__getitem__)
+    if [behind[name] for name in names] != [1, 2]:
+        raise ValueError("the joints do not follow one another")
+    axes = []
+    for name in names:
+        direction = np.array(_numbers(joints[name], "axis", "xyz", "1 0 0", 3))
+        length = np.linalg.norm(direction)
+        if length == 0:
+            raise ValueError("a joint's axis has no direction")
+        axes.append(frames[name][:3, :3] @ direction / length)
+    about = axes[0]
+    if np.linalg.norm(np.cross(*axes)) > _PARALLEL:
+        raise ValueError("the joints' axes are not parallel")
+    last, tip = {parent[name]: name for name in joints}, names[1]
+    while tip in last:
+        tip = last[tip]
+    places = [frames[name][:3, 3] for name in (*names, tip)]
+    numbers: dict[str, float] = {}
+    for number, (name, joint) in enumerate(zip(names, places[:2], strict=True), start=1):
+        mass, moment, inertia = 0.0, np.zeros(3), 0.0  # about the joint's axis
+        for link, frame in frames.items():
+            if behind[link] == number and links[link].find("inertial") is not None:
+                own, second, m = _inertial(links[link])
+                body = frame @ own
+                across, r = body[:3, :3].T @ about, body[:3, 3] - joint
+                inertia += float(across @ second @ across + m * (r @ r - (about @ r) ** 2))
+                mass, moment = mass + m, moment + m * r
+        if mass <= 0:
+            raise ValueError(f"link {name} has no mass")
+        line = places[number] - joint
+        if number == 2 and not line.any():  # no frame is the tip: the centre of mass
+            line = moment / mass
+        line = line - about * (about @ line)
+        length = np.linalg.norm(line)
+        if length <= _ROUNDING:
+            raise ValueError(f"link {name} has no length across its axis")
+        along, beside = (x @ moment / mass / length for x in (line, np.cross(about, line)))
+        # a centre behind the joint has a negative distance
+        far = math.copysign(math.hypot(along, beside), along)
+        numbers |= {
+            f"m{number}": mass,
+            f"l{number}": float(length),
+            f"lc{number}": far,
+            f"I{number}": inertia - mass * far**2,
+            f"delta{number}": math.atan2(beside * math.copysign(1.0, along), abs(along)),
+            f"b{number}": _numbers(joints[name], "dynamics", "damping", "0")[0],
+        }
+    tilt = math.sqrt(max(0.0, 1 - float(about[2]) ** 2))
+    friction = [_numbers(joints[name], "dynamics", "friction", "0")[0] for name in names]
+    return Arm(**numbers, g=GRAVITY * tilt if tilt > _PARALLEL else 0.0), tuple(friction)
+
+
+def _text(element: ET.Element, path: str, name: str, default: str | None = None) -> str:
+    """An attribute of the part at `path`; raises `ValueError` where there is none."""
+    part = element.find(path) if path else element
+    text = default if part is None else part.get(name, default)
+    if text is None:
+        raise ValueError(f"<{element.tag}> {path} has no {name}")
+    return text
+
+
+def _numbers(
+    element: ET.Element, path: str, name: str, default: str | None = None, count: int = 1
+) -> list[float]:
+    """An attribute's finite numbers; raises `ValueError` where there are no or other ones."""
+    text = _text(element, path, name, default)
+    numbers = list(map(float, text.split()))
+    if len(numbers) != count or not np.isfinite(numbers).all():
+        raise ValueError(f"expected {counted(count, 'finite number')}, found {text!r:.60}")
+    return numbers
+
+
+def _inertial(link: ET.Element) -> tuple[FloatArray, FloatArray, float]:
+    """The frame (4, 4) of a link's centre of mass, the inertia (3, 3) about it, and its mass."""
+
+    def moment(a: str, b: str) -> float:
+        return _numbers(link, "inertial/inertia", "i" + "".join(sorted(a + b)))[0]
+
+    inertia = np.array([[moment(a, b) for b in "xyz"] for a in "xyz"])
+    return (_origin(link, "inertial/origin"), inertia, _numbers(link, "inertial/mass", "value")[0])
+
+
+def _origin(element: ET.Element, path: str) -> FloatArray:
+    """The origin (4, 4) at `path`: roll, pitch, yaw about fixed axes, and its place."""
+    frame = np.eye(4)
+    for axis, angle in enumerate(_numbers(element, path, "rpy", "0 0 0", 3)):
+        turn, rows = np.eye(3), [(axis + 1) % 3, (axis + 2) % 3]
+        c, s = math.cos(angle), math.sin(angle)
+        turn[np.ix_(rows, rows)] = [[c, -s], [s, c]]
+        frame[:3, :3] = turn @ frame[:3, :3]
+    frame[:3, 3] = _numbers(element, path, "xyz", "0 0 0", 3)
+    return frame

@@ -21,7 +21,6 @@ from algid.estimators.whitening import (
 from algid.identification.known import (
     by_constants,
     covariance_of,
-    has_error_bar,
     model_of,
     noise_of,
     payload_length,
@@ -155,11 +154,11 @@ def arm_of(
         if "m_p" in result.fit.covariance_names:
             uncertain.add("m_p")
     lengths = {"l1": l1, "l2": l2}
-    uncertain |= {name for name in lengths if lengths[name] is None and has_error_bar(result, name)}
+    uncertain.update(name for name in with_error_bar(result, lengths) if lengths[name] is None)
     if l1 is None and result.settings.get("l1") is None and payload_length(result) is None:
         constants = by_constants(result)
         if constants is not None and constants[0] > 0:
-            lengths["l1"], slopes = constants
+            lengths["l1"], _, slopes = constants
             T[kept.index("l1")] = vector(names, slopes, otherwise=0.0)
     for name, given in lengths.items():
         # the one given, else the one the result was made with, else its estimate

@@ -161,9 +161,16 @@ def explained(rows: Rows, moments: FloatArray) -> float:
     return float(np.sum((fitted @ X) ** 2))
 
 
-@dataclass(frozen=True)
-class Confirmation:
-    """Evidence of changes in the rows about them.
+def confirmed(
+    source: Callable[[], Iterable[Segment]],
+    arm: IdentifiedArm,
+    drift: Drift,
+    ends: tuple[float, float],
+    variance: float,
+    changes: Sequence[ChangeTime],
+    weighed: Sequence[float],
+) -> list[ChangeTime]:
+    """Those of the changes, as cells have them, that the rows bear out, each where they do.
 
     Parameters
     ----------
@@ -173,83 +180,66 @@ class Confirmation:
     drift : Drift
     ends : s, of the log
     variance : of the rows, one at least
+    changes : as cells have them
+    weighed : masses in kg between them, one more
     """
+    places, masses = list(changes), list(weighed)
+    penalty, count = PENALTY * variance, None
 
-    source: Callable[[], Iterable[Segment]]
-    arm: IdentifiedArm
-    drift: Drift
-    ends: tuple[float, float]
-    variance: float
-
-    def of(self, changes: Sequence[ChangeTime], weighed: Sequence[float]) -> list[ChangeTime]:
-        """Those of the changes, as cells have them, that the rows bear out, each where they do.
-
-        `weighed` are the masses in kg between them, one more.
-        """
-        places, masses = list(changes), list(weighed)
-        penalty, count = PENALTY * self.variance, None
-        while places and len(places) != count:
-            count = len(places)
-            places = self._placed(places, masses)
-            # Close changes whose rows need only one become one: a jolt is no change of payload.
-            times = np.array([one.time for one in places])
-            close = [(at, at + 1) for at in np.flatnonzero(np.diff(times) < CLOSE).tolist()]
-            single: dict[int, ChangeTime] = {}
-            for (first, last), rows in self._rows(places, masses, close):
-                one = self._place(rows, times[first] - MARGIN, times[last] + MARGIN)
-                if one is not None:
-                    both = explained(rows, times[[first, last]])
-                    if both - explained(rows, np.array([one.time])) < penalty:
-                        single[first] = one
-            following = len(places)
-            for first, one in sorted(single.items(), reverse=True):
-                if first + 1 < following:  # of pairs that share a change, the later one
-                    places[first : first + 2], following = [one], first
-                    del masses[first + 1]
-            places = self._placed(places, masses)
-            # Drop those that explain too little, of neighbours the least first.
-            gains = [np.inf] + [one.gain for one in places] + [np.inf]
-            for at in reversed(range(len(places))):
-                before, own, after = gains[at : at + 3]
-                if own < penalty and own <= min(before, after):
-                    del places[at], masses[at + 1]
-        return places
-
-    def _rows(
-        self,
-        places: Sequence[ChangeTime],
-        masses: Sequence[float],
-        groups: Sequence[tuple[int, int]],
-    ) -> Iterator[tuple[tuple[int, int], Rows]]:
+    def rows_about(groups: Sequence[tuple[int, int]]) -> Iterator[tuple[tuple[int, int], Rows]]:
         """The rows about each group of changes, from its first to its last, in one pass.
 
         They hold the masses about the group, and no other.
         """
-        safe = [(-np.inf, self.ends[0]), *(one.safe for one in places), (self.ends[1], 0)]
+        safe = [(-np.inf, ends[0]), *(one.safe for one in places), (ends[1], 0)]
         times = [one.time for one in places]
-        spans = []
+        own, spans = list(masses), []
         for first, last in groups:
             start, end = safe[first][1], safe[last + 2][0]
             spans.append((max(start, times[first] - WIDEST), min(end, times[last] + WIDEST)))
-        for at, piece in windows(self.source(), spans, self.arm.shift):
+        for at, piece in windows(source(), spans, arm.shift):
             first, last = groups[at]
-            own = masses[first : last + 2]
             if len(piece) > 2 * POINTS:
-                yield groups[at], rows_of(piece, self.arm, self.drift, times[first : last + 1], own)
+                moments = times[first : last + 1]
+                yield groups[at], rows_of(piece, arm, drift, moments, own[first : last + 2])
 
-    def _place(self, rows: Rows, low: float, high: float) -> ChangeTime | None:
+    def within(rows: Rows, low: float, high: float) -> ChangeTime | None:
         """The change between `low` and `high` s; None where the rows are too few."""
         low, high = max(low, float(rows.t[0]) + MARGIN), min(high, float(rows.t[-1]) - MARGIN)
-        return place(rows, low, high, self.variance) if low < high else None
+        return place(rows, low, high, variance) if low < high else None
 
-    def _placed(self, changes: Sequence[ChangeTime], masses: Sequence[float]) -> list[ChangeTime]:
-        """Each change where the rows about it have it; where they are too few, as it was."""
-        places = list(changes)
-        alone = [(at, at) for at in range(len(places))]
-        for (at, _), rows in self._rows(changes, masses, alone):
+    def shift() -> None:
+        """Move each change to where the rows about it have it."""
+        for (at, _), rows in rows_about([(at, at) for at in range(len(places))]):
             time = places[at].time
-            places[at] = self._place(rows, time - REACH, time + REACH) or places[at]
-        return places
+            places[at] = within(rows, time - REACH, time + REACH) or places[at]
+
+    while places and len(places) != count:
+        count = len(places)
+        shift()
+        # Close changes whose rows need only one become one: a jolt is no change of payload.
+        times = np.array([one.time for one in places])
+        close = [(at, at + 1) for at in np.flatnonzero(np.diff(times) < CLOSE).tolist()]
+        single: dict[int, ChangeTime] = {}
+        for (first, last), rows in rows_about(close):
+            one = within(rows, times[first] - MARGIN, times[last] + MARGIN)
+            if one is not None:
+                both = explained(rows, times[[first, last]])
+                if both - explained(rows, np.array([one.time])) < penalty:
+                    single[first] = one
+        following = len(places)
+        for first, one in sorted(single.items(), reverse=True):
+            if first + 1 < following:  # of pairs that share a change, the later one
+                places[first : first + 2], following = [one], first
+                del masses[first + 1]
+        shift()
+        # Drop those that explain too little, of neighbours the least first.
+        gains = [np.inf] + [one.gain for one in places] + [np.inf]
+        for at in reversed(range(len(places))):
+            before, own, after = gains[at : at + 3]
+            if own < penalty and own <= min(before, after):
+                del places[at], masses[at + 1]
+    return places
 
 
 def windows(

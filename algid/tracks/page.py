@@ -24,8 +24,16 @@ from algid.report.series import reduced
 from algid.report.tables import log_tables, provenance_table, settings_table
 from algid.results.verdict import LEAST_R2, WORST_R2, share_text, wrong_length
 from algid.tracks.cells import CELL
-from algid.tracks.payload import HALF_BAND, Stretch
-from algid.tracks.result import CURVE, FILE, StretchStatus, TrackResult, track_json, write_tables
+from algid.tracks.payload import HALF_BAND
+from algid.tracks.result import (
+    CURVE,
+    FILE,
+    Stretch,
+    StretchStatus,
+    TrackResult,
+    track_json,
+    write_tables,
+)
 
 COLOURED = 4.0  # of the rows' variance: intervals twice as wide as the sensors' noise asks for
 STRANGE = 1e4

@@ -10,18 +10,29 @@ rows' variance where it exceeds one, slow errors (`algid.tracks.change_points`) 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+import hashlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from itertools import pairwise, starmap
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from algid import __version__
 from algid.arm import FloatArray
 from algid.base.criteria import HOLE
-from algid.base.significance import NORMAL
+from algid.base.errors import LogError
+from algid.base.files import read_whole
+from algid.base.runtime import one_blas_thread
 from algid.estimators.problem import TooShortError
+from algid.identification.known import as_logged, contradictions, reused
+from algid.identification.open_logs import LogLike, open_source, read_otherwise
+from algid.identification.recordings import Recordings
+from algid.notices import Notice, lossy, merged
+from algid.results import Result, read_result, result_json
 from algid.signals.segments import Segment
-from algid.tracks.arm import IdentifiedArm
+from algid.tracks.arm import IdentifiedArm, arm_of
 from algid.tracks.cells import CELL, Cells, cells_of, joined
 from algid.tracks.change_points import (
     AHEAD,
@@ -32,8 +43,12 @@ from algid.tracks.change_points import (
     rough_variance,
     sums,
 )
-from algid.tracks.change_times import ChangeTime, Confirmation, windows
+from algid.tracks.change_times import ChangeTime, confirmed, windows
 from algid.tracks.drift import Drift, drift_of
+from algid.tracks.result import Stretch, Track, TrackResult
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
 
 ROUNDS = 2  # of linearising each stretch at its own mass and looking for the changes again
 FEWEST = 4  # cells that weigh a stretch
@@ -45,45 +60,81 @@ HALF_BAND = 0.25  # s: m_p(t) rests on so much log on both sides of t
 Pass = Callable[[], Iterable[Segment]]
 
 
-@dataclass(frozen=True)
-class Stretch:
-    """A time in s during which the payload was m_p kg, with its standard deviation."""
+def track_log(
+    log: LogLike,
+    parameters: Result | str | Path,
+    *,
+    l1: float | None = None,
+    l2: float | None = None,
+    profile: Profile | None = None,
+    settings: Mapping[str, Any] | None = None,
+) -> TrackResult:
+    """Find when the payload changed during a log and what each stretch weighs.
 
-    start: float
-    end: float
-    m_p: float
-    std: float
+    Parameters
+    ----------
+    log : path or `Log`
+    parameters : Result or path of one
+        The arm.
+    l1, l2 : float, m
+        Link lengths; the result's by default.
+    profile : Profile
+        What the log's names, units and signs mean; where it is silent, what was said of the
+        result's logs.
+    settings : mapping
+        What else the result should hold of the call.
 
-    @property
-    def ci95(self) -> tuple[float, float]:
-        """The 95 % interval, kg."""
-        return self.m_p - NORMAL * self.std, self.m_p + NORMAL * self.std
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """Stretches; m_p(t), its standard deviation and its stretch at each instant, each (C,).
-
-    Times at which the payload may be changing have no m_p(t).
-    `left` (C,) is the RMS of what arm and payload leave of the torque, over the sensors' noise.
-    `changes` (n, 3) are each change's time in s, and the times between which it surely lies.
-    `colour` is the rows' variance over that of sensor noise, slow errors included: above one, the
-    arm's model lacks something. `explained` is the share of the torque's power, noise aside, that
-    arm and payload explain. `holes` (h, 2) are the times from and to which the log has no samples.
-    `tip_equivalent` is the mass in kg that at the tip would weigh on joint 2 as link 2 does.
+    Raises
+    ------
+    LogError
+        If the log cannot be used or is too short.
+    ResultError
+        If the result cannot be read, or leaves a constant or a link length open.
     """
-
-    stretches: list[Stretch]
-    t: FloatArray
-    m_p: FloatArray
-    std: FloatArray
-    stretch: FloatArray
-    left: FloatArray
-    changes: FloatArray
-    colour: float
-    explained: float
-    holes: FloatArray
-    tip_equivalent: float
+    if isinstance(parameters, Result):
+        result, content, called = parameters, result_json(parameters).encode(), parameters.log.path
+    else:
+        file, called = Path(parameters), str(parameters)
+        result = read_result(file)
+        content = read_whole(file / "result.json" if file.is_dir() else file)
+    profile = reused(profile, result, called)
+    source = open_source(log, "loaded", profile, profile.gravity, changing=True)
+    survey = Recordings([source])
+    first = next(survey.segments(source), None)
+    if first is None:
+        raise LogError(f"{source.name}: it holds no samples; record longer")
+    arm, covariance = arm_of(as_logged(result, profile), first, l1, l2)
+    try:
+        with one_blas_thread():
+            weighed = track(partial(survey.segments, source), arm, covariance)
+    except TooShortError as error:
+        raise LogError(f"{source.name}: {error}; record longer") from error
+    truth, of_log = source.origin.truth, survey.whole(source).notices
+    judged = result.verdict
+    notices = []
+    if judged.grade != "good":
+        numbers = {"grade": judged.word.lower(), "headline": judged.headline}
+        notices.append(Notice("ARM_DOUBTFUL", numbers=numbers))
+    lengths = {name: one for name, one in (("l1", l1), ("l2", l2)) if one is not None}
+    notices += contradictions(result, lengths)
+    notices += read_otherwise([survey.summary(source)], result, called)
+    notices += merged(of_log)
+    schedule = None
+    if truth is not None:
+        schedule = truth.schedule or ((0.0, truth.payload),)
+    own_settings = {name: arm.value(name) for name in ("l1", "l2")}
+    own_settings["gravity"] = arm.model.gravity
+    return TrackResult(
+        track=weighed,
+        log=survey.summary(source),
+        arm=called,
+        arm_sha256=hashlib.sha256(content).hexdigest(),
+        settings=own_settings | dict(settings or {}),
+        version=__version__,
+        schedule=schedule,
+        notices=tuple(notices),
+        data_lost=lossy(of_log),
+    )
 
 
 def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
@@ -118,8 +169,7 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
         shown.append(ChangeTime(time, safe, safe, np.inf))
     masses = [drift.freed(part).mass for part in _cut(cells, places)]
     ends = float(cells.start[0]), float(cells.end[-1])
-    evidence = Confirmation(source, arm, drift, ends, spread)
-    changes = evidence.of(shown, masses)
+    changes = confirmed(source, arm, drift, ends, spread, shown, masses)
     # whitening remembers: what a stretch is weighed by starts behind the jolt at its beginning
     settled = _settled(source, arm, _inner_parts(cells, changes), drift)
     return _weigh(cells, changes, settled, arm, covariance)

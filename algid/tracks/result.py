@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
+from algid.arm import FloatArray
 from algid.base.criteria import UNDETERMINED
 from algid.base.errors import ResultError
 from algid.base.files import first_misfit, read_whole, whole_file
@@ -20,7 +21,6 @@ from algid.notices import Notice
 from algid.report.export import START_KEY
 from algid.report.series import blocks
 from algid.results import LogSummary
-from algid.tracks.payload import Stretch, Track
 
 FILE, CURVE = "track.json", "track.parquet"
 COLUMNS = ("t", "m_p", "high", "stretch", "left")
@@ -35,6 +35,47 @@ class StretchStatus(StrEnum):
     OK = "OK"
     WEAK_EXCITATION = "WEAK_EXCITATION"
     NEGATIVE_MASS = "NEGATIVE_MASS"
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A time in s during which the payload was m_p kg, with its standard deviation."""
+
+    start: float
+    end: float
+    m_p: float
+    std: float
+
+    @property
+    def ci95(self) -> tuple[float, float]:
+        """The 95 % interval, kg."""
+        return self.m_p - NORMAL * self.std, self.m_p + NORMAL * self.std
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Stretches; m_p(t), its standard deviation and its stretch at each instant, each (C,).
+
+    Times at which the payload may be changing have no m_p(t).
+    `left` (C,) is the RMS of what arm and payload leave of the torque, over the sensors' noise.
+    `changes` (n, 3) are each change's time in s, and the times between which it surely lies.
+    `colour` is the rows' variance over that of sensor noise, slow errors included: above one, the
+    arm's model lacks something. `explained` is the share of the torque's power, noise aside, that
+    arm and payload explain. `holes` (h, 2) are the times from and to which the log has no samples.
+    `tip_equivalent` is the mass in kg that at the tip would weigh on joint 2 as link 2 does.
+    """
+
+    stretches: list[Stretch]
+    t: FloatArray
+    m_p: FloatArray
+    std: FloatArray
+    stretch: FloatArray
+    left: FloatArray
+    changes: FloatArray
+    colour: float
+    explained: float
+    holes: FloatArray
+    tip_equivalent: float
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ import algid
 from algid.base.errors import ResultError
 from algid.identification.identify import identify
 from algid.identification.known import (
+    by_constants,
     contradictions,
-    first_length,
     model_of,
     prior_of,
     shift_of,
@@ -107,8 +107,8 @@ def test_a_constant_that_is_needed_and_open_is_named(
 
 
 def test_lengths_that_far_off_contradict_the_result(weighed: Result) -> None:
-    by_constants, own = first_length(weighed), weighed.payload["l2"]
-    (l1, s1), (l2, s2) = by_constants, (own.estimate, own.std)
+    own = weighed.payload["l2"]
+    (l1, s1, _), (l2, s2) = by_constants(weighed), (own.estimate, own.std)
     assert contradictions(weighed, {"l1": l1 + 4.89 * s1, "l2": l2 - 4.89 * s2}) == ()
     first, second = contradictions(weighed, {"l1": l1 + 5.6 * s1, "l2": l2 - 7.2 * s2})
     assert (
@@ -139,7 +139,7 @@ def test_the_first_length_of_a_bent_arm_is_that_of_its_moments_sizes(weighed: Re
         update={"covariance_names": names, "covariance": covariance.tolist()}
     )
     bent = weighed.model_copy(update={"parameters": {**weighed.parameters, **own}, "fit": fit})
-    found = first_length(bent)
+    found = by_constants(bent)
     draws = rng.multivariate_normal(list(mean.values()), root @ root.T, 20_000).T
     lengths = 9.81 * np.abs(draws[0] + 1j * draws[2]) / np.abs(draws[1] + 1j * draws[3])
     assert found[0] == pytest.approx(9.81 * abs(0.08 + 0.03j) / abs(1.9 + 0.7j))

@@ -10,7 +10,7 @@ import pytest
 from algid.arm import FloatArray, inverse_dynamics
 from algid.base.errors import ResultError
 from algid.exports.formats import exported
-from algid.identification.urdf import read_urdf
+from algid.identification.prior import read_urdf
 from algid.model import Model, Motion, torque
 from tests.exports.arms import ODD, result_of, states, values_of
 

@@ -20,9 +20,8 @@ from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 from algid.tracks.arm import IdentifiedArm
 from algid.tracks.cells import CELL, Cells, cells_of, joined
-from algid.tracks.payload import HALF_BAND, Stretch, track
-from algid.tracks.result import StretchStatus, TrackResult
-from algid.tracks.run import track_log
+from algid.tracks.payload import HALF_BAND, track, track_log
+from algid.tracks.result import Stretch, StretchStatus, TrackResult
 from tests.tracks.folders import CASE, carrier, noisy
 from tests.tracks.test_tables import track as masses_of
 

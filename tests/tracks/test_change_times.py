@@ -12,8 +12,8 @@ from algid.signals.differences import POINTS, Stencil
 from algid.signals.segments import segments
 from algid.tracks.change_times import (
     ChangeTime,
-    Confirmation,
     Rows,
+    confirmed,
     place,
     rows_of,
     step_response,
@@ -32,8 +32,8 @@ def rough(*moments: float) -> tuple[ChangeTime, ...]:
 
 
 def kept(log: Log, moments: tuple[float, ...], masses: tuple[float, ...]) -> list[ChangeTime]:
-    evidence = Confirmation(lambda: segments([log]), ARM, STEADY, (0.0, 4.5), 1.0)
-    return evidence.of(rough(*moments), masses)
+    ends = (0.0, 4.5)
+    return confirmed(lambda: segments([log]), ARM, STEADY, ends, 1.0, rough(*moments), masses)
 
 
 def test_a_step_of_acceleration_is_seen_as_differences_see_it() -> None:

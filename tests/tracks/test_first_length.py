@@ -6,7 +6,7 @@ import pytest
 
 import algid
 from algid.exports.description import describe
-from algid.identification.known import first_length, payload_length
+from algid.identification.known import by_constants, payload_length
 from algid.results import Result
 from algid.signals.segments import Segment
 from algid.synth.sensors import Sensors
@@ -34,18 +34,18 @@ def segment() -> Segment:
 
 
 def test_the_better_of_constants_and_payload_is_taken(weighed: Result) -> None:
-    by_constants = first_length(weighed)
+    first = by_constants(weighed)
     told = weighed.payload["l1"].estimate
-    sure = with_payload_std(weighed, by_constants[1] / 2)
-    unsure = with_payload_std(weighed, by_constants[1] * 2)
-    assert payload_length(sure) == (told, by_constants[1] / 2)
+    sure = with_payload_std(weighed, first[1] / 2)
+    unsure = with_payload_std(weighed, first[1] * 2)
+    assert payload_length(sure) == (told, first[1] / 2)
     assert payload_length(unsure) is None
     assert arm_of(sure, segment())[0].value("l1") == told
-    assert arm_of(unsure, segment())[0].value("l1") == pytest.approx(by_constants[0])
+    assert arm_of(unsure, segment())[0].value("l1") == pytest.approx(first[0])
     lengths = [
         found.links[0].length
         for found in (describe(one, "arm", {}, links=True) for one in (sure, unsure))
         if found.links
     ]
-    assert lengths == [told, pytest.approx(by_constants[0])]
+    assert lengths == [told, pytest.approx(first[0])]
     assert arm_of(unsure, segment(), l1=0.3)[0].value("l1") == 0.3

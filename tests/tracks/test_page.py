@@ -25,8 +25,8 @@ from algid.tracks.page import (
     verdict,
     write_track,
 )
+from algid.tracks.payload import track_log
 from algid.tracks.result import TrackResult, read_track, track_json
-from algid.tracks.run import track_log
 from algid.writers import write_log
 from tests.cli.commands import app
 from tests.tracks.folders import CASE, noisy

@@ -13,8 +13,7 @@ from algid.tracks.page import (
     change_table,
     payload_figure,
 )
-from algid.tracks.payload import Stretch, Track
-from algid.tracks.result import TrackResult
+from algid.tracks.result import Stretch, Track, TrackResult
 from tests.report.pages import named, typed
 
 LOG = LogSummary(

@@ -18,7 +18,8 @@ from algid.signals.segments import segments
 from algid.synth.run import Acquisition, excitation, synthesise
 from algid.tracks import drift
 from algid.tracks.cells import CELL
-from algid.tracks.payload import HALF_BAND, Track, track
+from algid.tracks.payload import HALF_BAND, track
+from algid.tracks.result import Track
 from algid.writers import write_log
 from tests.intervals import holds_95, holds_at_least_95
 from tests.tracks.folders import CASE, RUBBING, carrier, noisy, rubbing
