@@ -16,12 +16,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from algid.api.batch import batch
     from algid.api.compare import compare
-    from algid.api.convert import convert
+    from algid.api.convert import convert, read_log, write_log
     from algid.api.design import design
     from algid.api.export import export
     from algid.api.identify import identify
     from algid.api.inspect import inspect
-    from algid.api.read import read_log, write_log
     from algid.api.result import Result, read_result
     from algid.api.synth import synthesise
     from algid.api.track import track
@@ -73,13 +72,13 @@ _HOMES = {
     "export": "algid.api.export",
     "identify": "algid.api.identify",
     "inspect": "algid.api.inspect",
-    "read_log": "algid.api.read",
+    "read_log": "algid.api.convert",
     "read_result": "algid.api.result",
     "simulate": "algid.synth.simulator",
     "synthesise": "algid.api.synth",
     "track": "algid.api.track",
     "validate": "algid.api.validate",
-    "write_log": "algid.api.read",
+    "write_log": "algid.api.convert",
 }
 
 

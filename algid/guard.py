@@ -19,7 +19,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
-from algid.base.exits import Exit
+from algid.base.errors import Exit
 
 SILENCE = 10.0  # s of processor time within which reading hands on a sample
 BYTES_A_SECOND = 10_000_000  # of a file's size, for which reading has one second more

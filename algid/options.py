@@ -2,7 +2,8 @@
 
 A setting is a field of `algid.settings.Settings` or `algid.profile.Profile`, or a keyword of a
 verb: its type, default, bounds and help are stated there, and the command line reads them. What is
-seldom set has no flag of its own: ``--set NAME=VALUE`` sets it, like every line of a profile.
+seldom set has no flag of its own: ``--set NAME=VALUE`` sets it, like every line of a profile. What
+version 0.2 had under another name is refused with what to do instead.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+from algid.base.errors import SettingError
 
 SET = "--set "
 """Before a setting without a flag of its own."""
@@ -114,3 +117,42 @@ class _Flags(dict[str, str]):
 
 
 FLAGS: Mapping[str, str] = _Flags()
+
+MOVED: Mapping[str, str] = {
+    # commands
+    "algid example": "algid synth example",
+    "algid check": "algid validate RESULT --max-error 0.5",
+    "algid fleet": "algid report BATCH",
+    "algid profile": "algid inspect LOG --write-profile algid.toml",
+    # flags
+    "--report": "leave it out: pages are written by default",
+    "--against": "--max-error paper, or --max-error PERCENT",
+    "--tolerance-file": "--max-error FILE.toml",
+    "--format=markdown": "--format json, or read report.md",
+    "--to=yaml": "--to payload",
+    "--save-plots": "the figure's own button saves it as SVG",
+    "--plot-format": "the figure's own button saves it as SVG",
+    "--install-completion": 'in ~/.bashrc: eval "$(_ALGID_COMPLETE=bash_source algid)"',
+    "--show-completion": "_ALGID_COMPLETE=bash_source algid; or zsh_source, fish_source",
+    # keywords of Python
+    "synthesise(excitation=…)": "torque=, as the flag",
+    "synthesise(kind=…)": "format=, as the flag",
+    "write_log(kind=…)": "format=",
+    "design(wanted=…)": "for_=, as the flag --for",
+    "batch(profile_for=…)": "leave it out: keywords hold over each log's profile",
+}
+"""By the old name what stands in its place."""
+
+
+def refuse_moved(call: str) -> None:
+    """Refuse a call, of a command or of Python, that uses a name of version 0.2.
+
+    Raises
+    ------
+    SettingError
+        If the command, a flag or a keyword has moved: it says what to do instead.
+    """
+    by_set = {f"--{name.replace('_', '-')}": f"{flag(name)}=VALUE" for name in BY_SET}
+    for name, now in {**MOVED, **by_set}.items():
+        if f"{name} ".replace("=", " ") in f"{call} ".replace("=", " "):
+            raise SettingError(f"{name} is not in this version; instead: {now}")

@@ -30,8 +30,7 @@ import numpy as np
 import polars as pl
 
 from algid.arm import CONSTANT_NAMES, FloatArray
-from algid.base.errors import AlgidError
-from algid.base.exits import Exit
+from algid.base.errors import AlgidError, Exit
 from algid.cli.app import called
 from algid.model import RIGID
 from algid.results import Result, read_result

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binom
 
-from algid.base.exits import exit_of
+from algid.base.errors import exit_of
 from algid.results import Result
 
 CHANCE = 1e-3  # that a cell of right intervals is marked

@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
-from algid.base.exits import Exit
+from algid.base.errors import Exit
 from algid.base.text import printable
 from pipelines.hostile import FINE
 from pipelines.hostile.calls import Call, draw_call

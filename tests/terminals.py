@@ -10,7 +10,8 @@ import struct
 import termios
 from typing import Any
 
-from algid.cli.output import console
+from rich.console import Console
+
 from algid.report.document import Document
 from algid.report.terminal import print_document
 from tests.processes import begin
@@ -21,7 +22,7 @@ WIDTH = 80
 def shown(document: Document) -> list[str]:
     """The lines, once none is wider than the terminal and none ends in a cut word."""
     text = io.StringIO()
-    print_document(document, console(file=text, width=WIDTH))
+    print_document(document, Console(file=text, width=WIDTH))
     lines = text.getvalue().splitlines()
     assert max(map(len, lines)) <= WIDTH, lines
     assert "…" not in text.getvalue(), lines

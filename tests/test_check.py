@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from algid.base.errors import ResultError, SettingError
-from algid.check import judge
 from algid.results import LogSummary, Result, Table4Row
+from algid.results.verdict import judged_errors
 
 ROWS = (
     Table4Row(
@@ -41,7 +41,7 @@ def _result(*rows: Table4Row) -> Result:
 def _judged(
     largest: float | str | Path = "paper",
 ) -> list[tuple[str, float | None, float, bool]]:
-    rows = judge(_result(*ROWS), largest)
+    rows = judged_errors(_result(*ROWS), largest)
     return [(row.parameter, row.error, row.limit, row.passed) for row in rows]
 
 
@@ -92,13 +92,13 @@ def test_limits_that_are_none_are_refused() -> None:
     with pytest.raises(
         ResultError, match=r"^log\.mcap: the log holds no true parameters; only synthetic logs"
     ):
-        judge(_result(ROWS[4]), 1.0)
+        judged_errors(_result(ROWS[4]), 1.0)
     with pytest.raises(ResultError, match=r"^log\.mcap: not a case of the paper; give --max-error"):
-        judge(_result(ROWS[3]), "paper")
+        judged_errors(_result(ROWS[3]), "paper")
 
 
 def test_one_row_over_its_limit_fails_the_check_and_every_row_is_a_line() -> None:
-    rows = judge(_result(*ROWS), "paper")
+    rows = judged_errors(_result(*ROWS), "paper")
     assert [row.passed for row in rows] == [True, False, False]
     assert [row.text for row in rows] == [
         "ok    k1                     2 %  limit 2 %",

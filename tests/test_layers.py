@@ -16,20 +16,18 @@ from tests.layers import PURE, Room, breaches, cycles, imported, parsed, room
 ROOT = Path(algid.__file__).parent
 TABLE: dict[str, Room] = {  # lower rooms first
     "errors": room(),
-    "exits": room(),
-    "guard": room("exits"),
+    "guard": room("errors"),
     "staging": room("guard"),
     "limits": room(packages="pydantic"),
     "units": room(),
-    "options": room(),
-    "faults": room("errors exits guard options"),
+    "options": room("errors"),
+    "faults": room("errors guard options"),
     "progress": room(),
     "significance": room(),
     "criteria": room(),
     "ros2": room("errors", "numpy"),
-    "text": room(),
+    "text": room("errors"),
     "notices": room("options text"),
-    "verdict": room("notices"),
     "arm": room(packages="numpy", library=PURE),
     "blocks": room(packages="numpy"),
     "arrow": room(packages="numpy pyarrow"),
@@ -52,10 +50,9 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "settings": room(
         "errors files limits methods model options physics profile signals", "pydantic"
     ),
-    "moved": room("errors options"),
     "results": room(
-        "criteria errors files log model names notices options settings significance text "
-        "verdict", "numpy polars pydantic"),
+        "criteria errors files log model names notices options settings significance text",
+        "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm estimators limits log model names results synth"),
     "writers": room("arrow errors files log ros2", "mcap numpy polars pyarrow"),
@@ -68,12 +65,11 @@ TABLE: dict[str, Room] = {  # lower rooms first
                        "quantiles readers signals text units", "numpy pydantic_core"),
     "report": room(
         "arm arrow blocks criteria errors files inspection methods model notices options "
-        "progress quantiles results ros2 significance text verdict",
+        "progress quantiles results ros2 significance text",
         "jinja2 markupsafe mcap numpy plotly pyarrow pydantic_core rich"
     ),
-    "check": room("errors files options results", "pydantic"),
     "identification": room(
-        "arm arrow check criteria errors estimators files inspection log methods model names "
+        "arm arrow criteria errors estimators files inspection log methods model names "
         "notices options physics profile progress readers report results runtime settings signals "
         "significance table4 text units",
         "numpy polars pyarrow",
@@ -85,12 +81,12 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "tracks": room(
         "arm compiled criteria errors estimators files identification model names notices options "
-        "profile report results runtime signals significance text verdict",
+        "profile report results runtime signals significance text",
         "numpy polars pyarrow pydantic",
     ),
     "designs": room(
         "arm criteria errors estimators files identification limits log model names "
-        "notices options progress report results signals significance synth text verdict "
+        "notices options progress report results signals significance synth text "
         "writers",
         "numpy polars pydantic pydantic_core scipy",
     ),
@@ -100,15 +96,15 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "jinja2 numpy polars scipy",
     ),
     "fleet": room("arm errors files limits model notices progress report "
-                  "significance text verdict", "numpy polars scipy"),
+                  "significance text", "numpy polars scipy"),
     "api": room(
-        "arm batches check designs errors exits exports files fleet identification "
-        "inspection limits log methods moved notices options physics profile progress "
+        "arm batches designs errors exports files fleet identification "
+        "inspection limits log methods notices options physics profile progress "
         "readers report results runtime settings stores synth text tracks units writers",
         "numpy plotly polars pydantic",
     ),
     "cli": room(
-        "api errors exits faults guard moved options progress report runtime text",
+        "api errors faults guard options progress report runtime text",
         "click rich",
     ),
 }  # fmt: skip

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from algid.base.exits import Exit
+from algid.base.errors import Exit
 
 if TYPE_CHECKING:
     from algid.report.document import Document, Table

@@ -14,8 +14,7 @@ from pydantic import ByteSize, Field
 
 from algid.api import Answer
 from algid.api.options import AnyResult, Options, ProfileLike, meant, opened, settings_of, verb
-from algid.base.errors import SettingError
-from algid.base.exits import Exit
+from algid.base.errors import Exit, SettingError
 from algid.base.limits import within
 from algid.base.text import visible
 from algid.options import Option, flag

@@ -1,4 +1,4 @@
-"""A log in another format, under algid's own names and units."""
+"""A log in Python, read and written, or in another format under algid's own names and units."""
 
 from __future__ import annotations
 
@@ -6,15 +6,17 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
+from algid import writers
 from algid.api import Answer
 from algid.api.options import LogOptions, ProfileLike, meant, verb
-from algid.base.exits import exit_of
+from algid.base.errors import exit_of
 from algid.notices import Notice, Remedy, lossy
 from algid.settings import DEFAULTS, OF_BOTH
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
     from algid.log import Log
+    from algid.readers.memory import FrameOrArrays
 
 
 @verb
@@ -72,7 +74,6 @@ def convert(
     []
     """
     from algid.readers import open_log
-    from algid.writers import write_log
 
     own = meant(profile, options)
     reader = open_log(source, own)
@@ -97,7 +98,7 @@ def convert(
             if progress is not None:
                 progress("writing", done, reader.rows)
 
-    write_log(out, noted(), truth=reader.origin.truth, force=force)
+    writers.write_log(out, noted(), truth=reader.origin.truth, force=force)
     return notices
 
 
@@ -106,3 +107,49 @@ def answer(notices: list[Notice], given: Mapping[str, Any]) -> Answer:
     remarks = [f"{one.code}: {one.clause}" for one in notices] + [f"wrote {given['out']}"]
     ended = exit_of(failed=False, lost=lossy(notices))
     return Answer(remarks=remarks, exit=ended)
+
+
+write_log = verb(writers.write_log)
+
+
+def read_log(
+    path: str | Path | FrameOrArrays,
+    profile: ProfileLike | None = None,
+    **options: Unpack[LogOptions],
+) -> Log:
+    """Read a whole log into memory.
+
+    Parameters
+    ----------
+    path : str, Path or columns
+        A file of any format that algid reads, or a rosbag2 folder; or a pandas or polars frame, or
+        a dict of arrays.
+    profile : Profile, path of one, or dict of what would stand in its file
+        What the log's names, units and signs mean, where the log does not tell.
+    **options : settings of `Profile` by their names
+        As ``zero="hanging"``.
+
+    Returns
+    -------
+    Log
+        Its samples in SI units, and in `notices` what its user should know.
+
+    Raises
+    ------
+    LogError
+        If there is no such log, its format is unknown, it is damaged, or it lacks a channel; if a
+        value is not finite or time runs wrong.
+    SettingError
+        If a setting is not known or wrong.
+
+    Examples
+    --------
+    >>> import algid
+    >>> t = [0.0, 0.01, 0.02, 0.03]
+    >>> columns = {"t": t, "theta": [[0.0, 0.1, 0.2, 0.3], [0.0, 0.0, 0.1, 0.1]], "tau": [t, t]}
+    >>> algid.read_log(columns, offsets=(1.0, 0.0)).theta[0].tolist()
+    [1.0, 1.1, 1.2, 1.3]
+    """
+    from algid.readers import read_log as read
+
+    return read(path, meant(profile, options))

@@ -20,7 +20,7 @@ from algid.api.options import (
     meant,
     verb,
 )
-from algid.base.exits import exit_of
+from algid.base.errors import exit_of
 from algid.base.limits import PHYSICAL, PLANNED, PRIOR_ERROR, within
 from algid.options import Option
 from algid.results import Result

@@ -67,11 +67,11 @@ def text_of(topic: str) -> str:
 
     def table(mark: re.Match[str]) -> str:
         from algid.api.options import options_of
-        from algid.base.exits import Exit
+        from algid.base.errors import Exit
         from algid.base.units import UNITS
         from algid.methods import ESTIMATORS
-        from algid.moved import MOVED
         from algid.notices import messages
+        from algid.options import MOVED
         from algid.physics.terms import OPTIONAL
         from algid.profile import Profile
         from algid.readers.formats import FORMATS

@@ -17,8 +17,7 @@ from algid.api.options import (
     settings_of,
     verb,
 )
-from algid.base.errors import SettingError
-from algid.base.exits import exit_of
+from algid.base.errors import SettingError, exit_of
 from algid.options import flag
 
 if TYPE_CHECKING:

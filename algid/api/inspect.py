@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from algid.api import Answer
 from algid.api.options import AnyLog, LogOptions, ProfileLike, meant, verb
-from algid.base.errors import SettingError
-from algid.base.exits import Exit, exit_of
+from algid.base.errors import Exit, SettingError, exit_of
 from algid.base.files import refuse_existing, whole_file
 from algid.base.text import lines_of
 from algid.options import flag

@@ -34,7 +34,6 @@ from pydantic import TypeAdapter, ValidationError
 from algid.base.errors import SettingError
 from algid.base.files import misfit, parsed_toml, whole_folder
 from algid.base.limits import KNOWN_LENGTH, KNOWN_MASS, within
-from algid.moved import refuse_moved
 from algid.options import (
     ADVANCED,
     ARGUMENTS,
@@ -44,6 +43,7 @@ from algid.options import (
     TYPED,
     Option,
     flag,
+    refuse_moved,
 )
 from algid.profile import Effort, Profile, load_profile, over, with_settings
 from algid.settings import DEFAULTS, OF_BOTH, Settings

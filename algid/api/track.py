@@ -19,7 +19,7 @@ from algid.api.options import (
     meant,
     verb,
 )
-from algid.base.exits import exit_of
+from algid.base.errors import exit_of
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress

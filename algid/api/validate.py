@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api import Answer
 from algid.api.options import AnyResult, LogOptions, Logs, ProfileLike, called, meant, opened, verb
-from algid.base.errors import SettingError
-from algid.base.exits import Exit
+from algid.base.errors import Exit, SettingError
 from algid.base.limits import within
-from algid.check import judge
 from algid.options import Option, flag
 from algid.results import Result
+from algid.results.verdict import judged_errors
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
@@ -96,7 +95,7 @@ def validate(
     from algid.identification.validate import validate as predicted
 
     own, logs, loaded = meant(profile, options, logs, loaded)
-    judged = () if max_error is None else tuple(judge(opened(result), max_error))
+    judged = () if max_error is None else tuple(judged_errors(opened(result), max_error))
     if logs is None and loaded is None:
         if max_error is None:
             raise SettingError(

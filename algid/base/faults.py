@@ -12,8 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
-from algid.base.errors import AlgidError, text_of
-from algid.base.exits import Exit
+from algid.base.errors import AlgidError, Exit, text_of
 from algid.guard import TRACEBACK, reading
 from algid.options import flag
 

@@ -14,6 +14,8 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from algid.base.errors import without_credentials
+
 LONGEST = 300
 # Controls drive a terminal, format characters reorder what is read, separators break lines.
 _HIDDEN = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
@@ -25,13 +27,16 @@ def visible(text: str, longest: int = LONGEST) -> str:
 
 
 def printable(text: str, kept: str = "\n\t") -> str:
-    """`text` with every invisible character, but those `kept`, as JSON's strings escape it."""
+    """`text` with every invisible character, but those `kept`, as JSON's strings escape it.
+
+    Credentials are left out.
+    """
 
     def shown(odd: re.Match[str]) -> str:
         hidden = odd[0] not in kept and unicodedata.category(odd[0]) in _HIDDEN
         return json.dumps(odd[0])[1:-1] if hidden else odd[0]
 
-    return _ODD.sub(shown, text)
+    return _ODD.sub(shown, without_credentials(text))
 
 
 _ODD = re.compile(r"[^ -~]")

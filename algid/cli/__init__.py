@@ -6,7 +6,7 @@ import gc
 import sys
 import warnings
 
-from algid.base.exits import Exit
+from algid.base.errors import Exit
 
 SELDOM = (20_000, 20, 20)
 """Thresholds of Python's search for cycles: its own let a short command search for a seventh of its

@@ -19,17 +19,15 @@ from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import click
-from click.shell_completion import CompletionItem, get_completion_class
+from click.shell_completion import CompletionItem
 
 from algid import __version__, api
-from algid.base.errors import AlgidError, SettingError
-from algid.base.exits import Exit, epilog
+from algid.base.errors import AlgidError, Exit, epilog
 from algid.base.faults import fault
 from algid.base.text import lines_of
-from algid.cli.output import complain, progress, remark, say, shown
+from algid.cli.output import complain, progress, remark, shown
 from algid.guard import TRACEBACK
-from algid.moved import refuse_moved
-from algid.options import ADVANCED, ARGUMENTS, EVERYDAY, VALUES, Option
+from algid.options import ADVANCED, ARGUMENTS, EVERYDAY, VALUES, Option, refuse_moved
 
 COMMANDS: Mapping[str, str] = {
     "inspect": "inspect",
@@ -167,33 +165,6 @@ def _completed(one: Option, _ctx: object, _parameter: object, begun: str) -> lis
     return found or [CompletionItem(begun, type="file")]
 
 
-EVAL = 'eval "$(_ALGID_COMPLETE={}_source algid)"'
-STARTS = {
-    "bash": (".bashrc", EVAL),
-    "zsh": (".zshrc", EVAL),
-    "fish": (".config/fish/config.fish", "_ALGID_COMPLETE={}_source algid | source"),
-}
-"""By shell the file that it reads as it starts, below the home folder, and the line for it."""
-
-
-def _completion(ctx: click.Context, option: click.Parameter, wanted: bool) -> None:
-    if not wanted:
-        return
-    shell = Path(os.environ.get("SHELL", "")).name
-    if shell not in STARTS:
-        raise SettingError(f"{option.opts[0]}: expected bash, zsh or fish, found {shell!r:.60}")
-    if option.name == "install_completion":
-        start, line = Path.home() / STARTS[shell][0], STARTS[shell][1].format(shell)
-        start.parent.mkdir(parents=True, exist_ok=True)
-        with start.open("a", encoding="utf-8") as file:
-            file.write(f"{line}\n")
-        say(f"added to {start}: {line}")
-    else:
-        made = get_completion_class(shell)(app, {}, "algid", "_ALGID_COMPLETE")  # type: ignore[misc]
-        say(made.source())
-    ctx.exit()
-
-
 class Algid(click.Group):
     """The commands by name."""
 
@@ -218,12 +189,6 @@ app = Algid(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 click.version_option(__version__, message="%(prog)s %(version)s", help="Print the version.")(app)
-for name, text in (
-    ("--install-completion", "Install completion for the current shell."),
-    ("--show-completion", "Print the script of that."),
-):
-    eager = {"is_flag": True, "is_eager": True, "expose_value": False}
-    app.params.append(click.Option([name], help=text, callback=_completion, **eager))
 
 
 def called(arguments: Sequence[str]) -> int:

@@ -1,4 +1,4 @@
-"""What commands print, and to where: the one place that makes text printable, whoever wrote it.
+"""What commands print, and to where: the one place that makes lines printable, whoever wrote them.
 
 A name in a log, a status in a result that was tampered with, a path: any may hold what drives a
 terminal. No pipe's reader and no terminal's alphabet can break standard output and error.
@@ -8,26 +8,18 @@ from __future__ import annotations
 
 import io
 import os
+import pathlib
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from algid.api import Manual
-from algid.base import text as letters
-from algid.base.errors import OutputError, without_credentials
 from algid.base.progress import Progress
+from algid.base.text import printable
 
 if TYPE_CHECKING:
-    from rich.console import Console, ConsoleOptions, RenderableType
-    from rich.segment import Segment
-
     from algid.api import Answer
-
-
-def printable(text: str) -> str:
-    """Text as a terminal may have it: what would drive it is escaped, credentials are left out."""
-    return letters.printable(without_credentials(text))
 
 
 def say(text: str) -> None:
@@ -51,26 +43,6 @@ def clear_line() -> None:
         print("\r\x1b[2K\x1b[?25h", end="", file=sys.stderr, flush=True)
 
 
-def console(**options: Any) -> Console:
-    """A terminal whose text is printable; `options` are those of rich."""
-    from rich.console import Console
-    from rich.segment import Segment
-
-    class Printable(Console):
-        """Shows what a segment would do to the terminal, but for what rich itself has it do."""
-
-        def render(
-            self, renderable: RenderableType, options: ConsoleOptions | None = None
-        ) -> Iterable[Segment]:
-            """The segments of `renderable`, their text printable."""
-            for segment in super().render(renderable, options):
-                yield (
-                    segment if segment.control else Segment(printable(segment.text), segment.style)
-                )
-
-    return Printable(**options)
-
-
 def shown(answer: Answer, json: bool, quiet: bool) -> None:
     """Print what a verb gave: results alone to standard output, so that they can be piped."""
     for line in answer.complaints:
@@ -82,18 +54,21 @@ def shown(answer: Answer, json: bool, quiet: bool) -> None:
         parts = [answer.json().rstrip()]
     for part in parts:
         if isinstance(part, Manual) and sys.stdout.isatty():
+            from rich.console import Console
             from rich.markdown import Markdown
 
-            console(width=min(console().width, 120)).print(Markdown(part))
+            Console(width=min(Console().width, 120)).print(Markdown(part))
         elif isinstance(part, Manual):
             print(part, end="")  # its examples of credentials are none
         elif isinstance(part, str):
             say(part)
         else:
+            from rich.console import Console
+
             from algid.report.document import Table
             from algid.report.terminal import print_document, print_table
 
-            terminal = console()
+            terminal = Console()
             if isinstance(part, Table):
                 print_table(part, terminal)
                 terminal.print()
@@ -114,6 +89,7 @@ def progress(unit: str, quiet: bool = False) -> Iterator[Progress | None]:
         yield None
         return
     from rich import progress as bars
+    from rich.console import Console
 
     parts = (
         bars.TextColumn("{task.description}", markup=False),
@@ -121,10 +97,11 @@ def progress(unit: str, quiet: bool = False) -> Iterator[Progress | None]:
         bars.TextColumn("{task.fields[counts]}", markup=False),
         bars.TimeRemainingColumn(),
     )
-    screen = console(stderr=True)
+    screen = Console(stderr=True)
     with bars.Progress(*parts, console=screen, transient=True, redirect_stdout=False) as bar:
 
         def shown(stage: str, done: int, total: int) -> None:
+            stage = printable(stage)
             known = total if total >= max(done, 1) else None
             counts = f"{done:,} of {known:,} {unit}" if known else f"{done:,} {unit}" * (done > 0)
             if [(task.description, task.total) for task in bar.tasks] != [(stage, known)]:
@@ -137,49 +114,31 @@ def progress(unit: str, quiet: bool = False) -> Iterator[Progress | None]:
 
 
 class _Pipe(io.FileIO):
-    """A descriptor whose reader may leave, like ``head``, or whose disk may be full.
+    """A descriptor whose reader may leave, like ``head``: what is written after that goes nowhere.
 
-    What is written after that goes nowhere. That a disk is full is raised, once, where there is a
-    `name` to tell it by: about standard error nobody can be told.
+    That a disk is full is raised, once, of standard output: about standard error nobody can be
+    told.
     """
-
-    def __init__(self, handle: int, told_as: str | None) -> None:
-        super().__init__(handle, "wb", closefd=False)
-        self._told_as = told_as
 
     def write(self, data: Any, /) -> int:
         try:
             return super().write(data)
         except OSError as error:
-            _to_nowhere(self.fileno())
-            if self._told_as is not None and not isinstance(error, BrokenPipeError):
-                reason = f"cannot write ({error.strerror}); send it elsewhere, or make room"
-                raise OutputError(f"{self._told_as}: {reason}") from error
+            if self.fileno() == 1 and not isinstance(error, BrokenPipeError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+                error.filename = "standard output"
+                raise
             return memoryview(data).nbytes
-
-
-def _to_nowhere(handle: int) -> None:
-    """Have what is written to a descriptor go nowhere."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    if nowhere != handle:  # a closed one is the first that the system gives
-        os.dup2(nowhere, handle)
-        os.close(nowhere)
 
 
 def harden_streams() -> None:
     """Let this process print to a reader that leaves, and to a terminal that lacks characters."""
-    for handle, name, told_as in ((1, "stdout", "standard output"), (2, "stderr", None)):
-        stream = getattr(sys, name)
-        if stream is None:  # closed: else the next file to be opened would be taken for it
-            _to_nowhere(handle)
-            stream = open(handle, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
-        try:
-            handle = stream.fileno()
-        except (AttributeError, OSError, ValueError):  # not of this process
-            continue
-        stream.flush()
+    for name in ("stdout", "stderr"):
+        # of a closed one its number: else the next file to be opened would be taken for it
+        stream = getattr(sys, name) or pathlib.Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115
+        handle = stream.fileno()
         if name == "stderr":  # libraries write to the descriptor itself: see `algid.guard.begin`
             handle = os.dup(handle)
-        raw, lines = io.BufferedWriter(_Pipe(handle, told_as)), name == "stderr" or stream.isatty()
-        text = io.TextIOWrapper(raw, stream.encoding, "backslashreplace", line_buffering=lines)
+        raw = io.BufferedWriter(_Pipe(handle, "wb", closefd=False))
+        text = io.TextIOWrapper(raw, stream.encoding, "backslashreplace", line_buffering=True)
         setattr(sys, name, text)

@@ -17,12 +17,11 @@ from algid import __version__
 from algid.arm import FloatArray
 from algid.base.files import whole_file
 from algid.base.text import ABSENT, counted, file_name, percent, resolved, significant, unit_text
-from algid.base.verdict import Verdict, graded
 from algid.designs.campaign import ARMS, SECOND, Planned, of_joints
 from algid.designs.limits import Row
 from algid.log import Log, Origin
 from algid.model import UNITS
-from algid.notices import Notice, Remedy
+from algid.notices import Notice, Remedy, Verdict, graded
 from algid.report.document import Document, Section, Table
 from algid.report.figures import shares_of_time
 from algid.report.plot import ArmDrawing, Panels

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from algid.base.files import whole_file
 from algid.base.significance import NORMAL
 from algid.base.text import ABSENT, counted, joined, percent, significant, unit_text, visible
-from algid.base.verdict import Verdict, graded
 from algid.fleet.findings import ALPHA, CHANGED, SPAN
 from algid.fleet.history import History
 from algid.model import UNITS
-from algid.notices import Notice
+from algid.notices import Notice, Verdict, graded
 from algid.report.document import Document, Section, Table
 from algid.report.plot import Panels
 from algid.report.render import page

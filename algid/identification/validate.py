@@ -20,9 +20,9 @@ from algid.table4 import finite
 if TYPE_CHECKING:
     import polars as pl
 
-    from algid.check import Judged
     from algid.profile import Profile
     from algid.report.document import Table
+    from algid.results.verdict import Judged
 
 EVERY = "all logs"
 

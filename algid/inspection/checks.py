@@ -22,6 +22,8 @@ from algid.inspection.channels import (
     degrees,
     efforts,
     held_efforts,
+    rests,
+    sampling,
     saturation,
     spikes,
     stuck,
@@ -36,7 +38,6 @@ from algid.inspection.figures import (
     dynamic_figures,
     signal_figures,
 )
-from algid.inspection.sampling import rests, sampling
 from algid.log import Log, Origin, Reading
 from algid.notices import Notice, codes_of, has_code, lossy
 from algid.readers import open_log

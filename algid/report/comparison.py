@@ -15,7 +15,7 @@ from algid.arm import FloatArray
 from algid.base.files import whole_file
 from algid.base.significance import NORMAL, sigmas
 from algid.base.text import ABSENT, counted, file_name, joined, percent, visible
-from algid.base.verdict import Grade, Verdict
+from algid.notices import Grade, Verdict
 from algid.report.document import Document, Section, Table
 from algid.report.plot import down
 from algid.report.render import page

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from algid.base.text import ABSENT
-from algid.base.verdict import Verdict
+from algid.notices import Verdict
 from algid.report.plot import ArmDrawing, Panels
 
 Kind = Literal["name", "number", "text", "status"]

@@ -24,7 +24,7 @@ from pydantic_core import to_json
 from algid import __version__
 from algid.base.files import whole_file
 from algid.base.text import visible
-from algid.base.verdict import MOST_REASONS
+from algid.notices import MOST_REASONS
 from algid.report.document import Document
 from algid.results import Result
 from algid.results.rows import rows_of

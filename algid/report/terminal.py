@@ -10,10 +10,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Literal
 
 from algid.arm import CONSTANT_NAMES as ARM
-from algid.base.text import ABSENT, counted, formatted, joined, lines_of, visible
-from algid.base.verdict import MOST_REASONS, Grade, Verdict
+from algid.base.text import ABSENT, counted, formatted, joined, lines_of, printable, visible
 from algid.model import DELAYS
-from algid.notices import codes_of
+from algid.notices import MOST_REASONS, Grade, Verdict, codes_of
 from algid.report.document import Document, Kind, Table
 from algid.results import Result, Status
 from algid.results.rows import rows_of
@@ -105,7 +104,7 @@ def print_document(document: Document, console: Console) -> None:
     from rich.text import Text
 
     judged = document.verdict
-    shown = Text("\n".join(verdict_lines(judged, console.width)))
+    shown = Text(printable("\n".join(verdict_lines(judged, console.width))))
     shown.stylize(GRADE_STYLES[judged.grade], 0, len(judged.word))
     console.print(shown, soft_wrap=True)
     for table in document.tables():
@@ -124,7 +123,7 @@ def print_table(table: Table, console: Console, *, failed: bool = False) -> None
     from rich.text import Text
 
     made = RichTable(
-        title=Text(table.title, "bold"),
+        title=Text(visible(table.title), "bold"),
         title_justify="left",
         box=box.SIMPLE_HEAD,
         pad_edge=False,

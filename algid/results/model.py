@@ -20,10 +20,9 @@ from pydantic import BaseModel, ConfigDict, ValidationError, computed_field, mod
 from algid.base.errors import ResultError
 from algid.base.files import first_misfit, read_whole, whole_file
 from algid.base.significance import NORMAL
-from algid.base.verdict import Verdict
 from algid.log import Reading
 from algid.model import DELAYS
-from algid.notices import Notice, code_of_now, notes_of, warnings_of
+from algid.notices import Notice, Verdict, code_of_now, notes_of, warnings_of
 
 SCHEMA_VERSION: Literal[4] = 4
 

@@ -1,19 +1,34 @@
-"""Whether to trust a result, by its statuses, intervals, residual and notices."""
+"""Whether to trust a result, by its statuses, intervals, residual and notices, or by the truth."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from math import isclose
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
 
 from algid.base.criteria import SAME_LENGTH
+from algid.base.errors import ResultError, SettingError
+from algid.base.files import read_toml
 from algid.base.names import outside
 from algid.base.significance import SURE
 from algid.base.text import counted, percent, significant, visible
-from algid.base.verdict import Verdict, graded
 from algid.model import CHOICES, EVERY_TERM, K1, K2, K3, K4, K5, K6, K7
-from algid.notices import Notice, Remedy, flat, has_code, notes_of, of_codes, warnings_of
+from algid.notices import (
+    Notice,
+    Remedy,
+    Verdict,
+    flat,
+    graded,
+    has_code,
+    notes_of,
+    of_codes,
+    warnings_of,
+)
 from algid.options import flag
 
 if TYPE_CHECKING:
@@ -258,3 +273,87 @@ def again(result: Result, flags: Sequence[str]) -> str:
     if flag("force") not in words:
         words.append(flag("force"))
     return visible(shlex.join(words), LONGEST_COMMAND)
+
+
+LARGEST = 1e9
+"""Percent."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One parameter's error in percent beside its limit; None where there was no estimate."""
+
+    parameter: str
+    error: float | None
+    limit: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether there is an estimate and its error is within the limit."""
+        return self.error is not None and self.error <= self.limit
+
+    @property
+    def text(self) -> str:
+        """One line for the terminal."""
+        word = "ok  " if self.passed else "OVER"
+        size = "no estimate" if self.error is None else f"{self.error:.4g} %"
+        return f"{word}  {self.parameter:12}  {size:>12}  limit {self.limit:.4g} %"
+
+
+class _Tolerances(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    max_error_percent: dict[str, Annotated[float, Field(ge=0)]] = Field(min_length=1)
+
+
+def judged_errors(result: Result, largest: float | str | Path) -> list[Judged]:
+    """Rows of Table 4 beside their limits.
+
+    Parameters
+    ----------
+    result : Result
+    largest : float, 'paper' or path
+        One limit for all in percent; the paper's; or a TOML file with a table
+        ``[max_error_percent]``.
+
+    Raises
+    ------
+    SettingError
+        If the limit is none, or names a parameter that is no row of Table 4.
+    ResultError
+        If the result holds no truth to compare with, or no case of the paper.
+    """
+    log = result.log.path
+    rows = {row.parameter: row for row in result.table4 if row.truth is not None}
+    if not rows:
+        raise ResultError(
+            f"{log}: the log holds no true parameters; only synthetic logs can be checked"
+        )
+    limits: Mapping[str, float | None] = {
+        name: row.paper_error_percent for name, row in rows.items()
+    }
+    if largest == "paper" and not any(limit is not None for limit in limits.values()):
+        raise ResultError(f"{log}: not a case of the paper; give {flag('max_error')} in percent")
+    if str(largest).endswith(".toml"):
+        limits = read_toml(Path(str(largest)), _Tolerances).max_error_percent
+        for name in limits:
+            if name not in rows:
+                raise SettingError(
+                    f"{largest}: max_error_percent.{name}: expected one of {', '.join(rows)}"
+                )
+    elif largest != "paper":
+        try:
+            percent = float(str(largest))
+        except ValueError:
+            percent = -1.0
+        if not 0 <= percent <= LARGEST:
+            raise SettingError(
+                f"{flag('max_error')}: expected a number from 0 to {LARGEST:g}, paper, or a TOML "
+                f"file, found {largest!r:.60}"
+            )
+        limits = dict.fromkeys(rows, percent)
+    return [
+        Judged(name, row.error_percent, limit)
+        for name, row in rows.items()
+        if (limit := limits.get(name)) is not None
+    ]

@@ -14,8 +14,7 @@ import numpy as np
 from algid.base.criteria import HOLE
 from algid.base.significance import NORMAL
 from algid.base.text import counted, file_name, formatted, joined, resolved, significant
-from algid.base.verdict import Verdict, graded
-from algid.notices import Notice, lossy, notes_of, warnings_of
+from algid.notices import Notice, Verdict, graded, lossy, notes_of, warnings_of
 from algid.report.document import Document, Section, Table
 from algid.report.export import write_mcap
 from algid.report.plot import Panels

@@ -42,8 +42,6 @@ NEVER = [
     "--watch",
     "--scheduler",
     "--version",
-    "--install-completion",
-    "--show-completion",
 ]
 """Options that wait for ever by intent, talk to a cluster, or print nothing else."""
 SLOW = {("identify", "--estimator"), ("identify", "--model"), ("identify", "--cross-validate")}

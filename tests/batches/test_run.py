@@ -18,14 +18,13 @@ import pytest
 import algid
 from algid.base.errors import LogError, OutputError, SettingError
 from algid.base.stores import open_store
-from algid.base.verdict import Verdict
 from algid.batches.discover import jobs_of
 from algid.batches.job import Task
 from algid.batches.jobs import Input, Job, JobStatus, stat_of
 from algid.batches.run import Batch, Batched, locked
 from algid.batches.workers import CallFailedError, WorkerDiedError
 from algid.identification.identify import identify
-from algid.notices import Notice
+from algid.notices import Notice, Verdict
 from algid.results import Result
 from algid.settings import Settings
 from algid.synth.cases import load_case

@@ -17,12 +17,10 @@ from pydantic import TypeAdapter
 import algid
 from algid.api.guide import TOPICS, text_of
 from algid.api.options import LogOptions, Options, options_of
-from algid.base.errors import AlgidError, SettingError
-from algid.base.exits import Exit, epilog
+from algid.base.errors import AlgidError, Exit, SettingError, epilog
 from algid.cli.app import COMMANDS, Command, command, listed
 from algid.methods import ESTIMATORS
-from algid.moved import MOVED
-from algid.options import BY_SET
+from algid.options import BY_SET, MOVED
 from algid.profile import Profile
 from algid.settings import Settings
 from tests.cli.commands import call
@@ -290,24 +288,6 @@ def completed(one: Command, name: str, begun: str) -> list[str]:
 )
 def test_words_complete(name: str, option: str, begun: str, expected: list[str]) -> None:
     assert completed(DERIVED[name], option, begun) == expected
-
-
-def test_the_completion_of_a_shell_is_printed_and_installed(
-    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    home = tmp_path_factory.mktemp("home")
-    monkeypatch.setenv("HOME", str(home))
-    for shell, start in (
-        ("bash", ".bashrc"),
-        ("zsh", ".zshrc"),
-        ("fish", ".config/fish/config.fish"),
-    ):
-        monkeypatch.setenv("SHELL", f"/bin/{shell}")
-        assert f"_ALGID_COMPLETE={shell}_complete" in call("--show-completion").out
-        assert call("--install-completion").code == 0
-        assert f"_ALGID_COMPLETE={shell}_source algid" in (home / start).read_text()
-    monkeypatch.setenv("SHELL", "/bin/csh")
-    assert call("--install-completion").err.startswith("algid: --install-completion: expected bash")
 
 
 def test_tables_of_the_guide_and_the_readme_are_those_of_the_code() -> None:

@@ -14,9 +14,9 @@ import pytest
 from algid.arm import FloatArray
 from algid.base.errors import LogError
 from algid.estimators.conventions import AS_READ
+from algid.inspection.channels import lost_steps, samples_a_period
 from algid.inspection.checks import examine
 from algid.inspection.figures import saturated_share
-from algid.inspection.sampling import lost_steps, samples_a_period
 from algid.log import ChannelReading, Log, Origin, Reading
 from algid.notices import of_codes
 from tests.inspection.test_checks import noticed, of_signals

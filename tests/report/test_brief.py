@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from algid.base.verdict import Verdict
-from algid.notices import Notice
+from algid.notices import Notice, Verdict
 from algid.report.terminal import WIDTH, brief, verdict_lines
 from algid.results import Result
 from algid.results.model import TorqueModel

@@ -15,7 +15,7 @@ import plotly.graph_objects as go
 import pytest
 
 from algid.base.errors import ResultError
-from algid.base.verdict import Verdict
+from algid.notices import Verdict
 from algid.report.document import Document, Section, Table
 from algid.report.page import write_pages
 from algid.report.render import library, markdown
