@@ -46,6 +46,10 @@ class LogInformation:
         """S (q, q) and g (q,) over the whole log."""
         return read_only(self.S.sum(axis=0)), read_only(self.g.sum(axis=0))
 
+    def about(self, c: FloatArray) -> LogInformation:
+        """The same likelihood, with its score at other coefficients `c` (q,)."""
+        return LogInformation(self.loaded, c, self.S, self.g - self.S @ (c - self.c0))
+
 
 @dataclass(frozen=True, eq=False)
 class Prior:
@@ -148,12 +152,9 @@ def combine(
     logs, offset = by_kind(logs)
     value, gradient, S = likelihood(shared, logs, beta, prior)
     for _ in range(_STEPS):
-        damped = S
-        if damping:
-            damped = S + damping * np.diag(np.diag(S))
-        step = scaled_pinv(damped) @ gradient
-        trial = _value(shared, logs, beta + step, prior)
-        if not np.isfinite(trial) or trial < value - 1e-9 * (1 + abs(value)):
+        step = scaled_pinv(S + damping * np.diag(np.diag(S))) @ gradient
+        trial = likelihood(shared, logs, beta + step, prior)
+        if not np.isfinite(trial[0]) or trial[0] < value - 1e-9 * (1 + abs(value)):
             damping = max(10 * damping, 1e-3)
             if damping > 1e12:
                 break
@@ -164,7 +165,7 @@ def combine(
             damping /= 10
         else:
             damping = 0.0
-        value, (gradient, S) = trial, _slope(shared, logs, beta, prior)
+        value, gradient, S = trial
         if gain < _DONE and damping == 0.0:
             break
     return beta, S, value + offset
@@ -175,28 +176,25 @@ def of_kind(logs: Iterable[LogInformation], loaded: bool) -> list[LogInformation
     return [log for log in logs if log.loaded is loaded]
 
 
-def by_kind(logs: Sequence[LogInformation]) -> tuple[Sequence[LogInformation], float]:
+def by_kind(logs: Iterable[LogInformation]) -> tuple[list[LogInformation], float]:
     """Unloaded and loaded logs in one sum each, and what that adds to their likelihood."""
-    sums, offset = [], 0.0
+    sums, offset = list[LogInformation](), 0.0
     for loaded in (False, True):
         own = of_kind(logs, loaded)
         if len(own) < 2:
             sums += own
             continue
-        c0, size = own[0].c0, own[0].c0.size
-        S, g = np.zeros((size, size)), np.zeros(size)
-        for log in own:
-            log_S, log_g = log.total
-            change = c0 - log.c0
-            S += log_S
-            g += log_g - log_S @ change
-            offset += float(log_g @ change - 0.5 * change @ log_S @ change)
-        sums.append(LogInformation(loaded, c0, S[None], g[None]))
+        S, g = map(np.stack, zip(*(log.total for log in own), strict=True))
+        change = own[0].c0 - np.stack([log.c0 for log in own])
+        fall = np.einsum("lij,lj->li", S, change)
+        offset += float(np.sum((g - 0.5 * fall) * change))
+        total = S.sum(axis=0)[None], (g - fall).sum(axis=0)[None]
+        sums.append(LogInformation(loaded, own[0].c0, *total))
     return sums, offset
 
 
 def likelihood(
-    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None
+    shared: Shared, logs: Iterable[LogInformation], beta: FloatArray, prior: Prior | None
 ) -> tuple[float, FloatArray, FloatArray]:
     """Log-likelihood of shared parameters `beta` (Q,).
 
@@ -205,50 +203,30 @@ def likelihood(
     Its value less that at the logs' own coefficients c0, its gradient Tᵀ (g − S (c − c0)) of shape
     (Q,), and its information Tᵀ S T of shape (Q, Q), T = dc/dβ; the prior's with them.
     """
-    return _value(shared, logs, beta, prior), *_slope(shared, logs, beta, prior)
-
-
-def _slope(
-    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None
-) -> tuple[FloatArray, FloatArray]:
-    """Gradient and information alone: a step that is taken has the value already."""
     size = len(shared.names)
-    gradient, S = np.zeros(size), np.zeros((size, size))
+    value, gradient, information = 0.0, np.zeros(size), np.zeros((size, size))
     for log in logs:
         T = shared.jacobian(beta, log.loaded)
         change = shared.coefficients(beta, log.loaded) - log.c0
-        log_S, log_g = log.total
-        gradient += T.T @ (log_g - log_S @ change)
-        S += T.T @ log_S @ T
+        S, g = log.total
+        value += float(g @ change - 0.5 * change @ S @ change)
+        gradient += T.T @ (g - S @ change)
+        information += T.T @ S @ T
     if prior is not None:
         places = prior.places(shared.names)
-        weight = prior.precision
-        gradient[places] -= weight @ (beta[places] - prior.mean)
-        S[np.ix_(places, places)] += weight
-    return gradient, S
-
-
-def _value(
-    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None
-) -> float:
-    """The log-likelihood alone, as `likelihood` gives it: a step that is refused needs no more."""
-    value = 0.0
-    for log in logs:
-        change = shared.coefficients(beta, log.loaded) - log.c0
-        log_S, log_g = log.total
-        value += float(log_g @ change - 0.5 * change @ log_S @ change)
-    if prior is not None:
-        change = beta[prior.places(shared.names)] - prior.mean
+        change = beta[places] - prior.mean
         value -= 0.5 * float(change @ prior.precision @ change)
-    return value
+        gradient[places] -= prior.precision @ change
+        information[np.ix_(places, places)] += prior.precision
+    return value, gradient, information
 
 
 def scores_of(
     shared: Shared, log: LogInformation, beta: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """T = dc/dβ, and the scores (B, q) of a log's stretches at `beta` (Q,)."""
-    change = shared.coefficients(beta, log.loaded) - log.c0
-    return shared.jacobian(beta, log.loaded), log.g - log.S @ change
+    own = log.about(shared.coefficients(beta, log.loaded))
+    return shared.jacobian(beta, log.loaded), own.g
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,24 +312,13 @@ def left_out(
 ) -> FloatArray:
     """Shared parameters (n, Q) without each of n logs in turn, from `beta` and no further pass.
 
-    What is left of a kind is one sum, without differences of sums: one log may inform 1e16 times as
-    much as the others.
+    The others are added up anew each time: in a difference of sums one log that informs 1e16 times
+    as much as they do would leave its rounding.
     """
     estimates = np.empty((len(logs), len(shared.names)))
-    loaded = np.array([log.loaded for log in logs])
-    for kind in (False, True):
-        (others, _), own = by_kind(of_kind(logs, not kind)), of_kind(logs, kind)
-        q = len(shared.log_names)
-        parts = np.zeros((len(own), q, q + 1))  # S and the score at one point
-        for part, log in zip(parts, own, strict=True):
-            S, g = log.total
-            part[:, :-1], part[:, -1] = S, g - S @ (own[0].c0 - log.c0)
-        nothing = np.zeros_like(parts[:1])
-        before = np.cumsum(np.concatenate([nothing, parts[:-1]]), axis=0)
-        after = np.cumsum(np.concatenate([nothing, parts[:0:-1]]), axis=0)[::-1]
-        for place, rest in zip(np.flatnonzero(loaded == kind), before + after, strict=True):
-            left = LogInformation(kind, own[0].c0, rest[None, :, :-1], rest[None, :, -1])
-            estimates[place] = combine(shared, [*others, left], beta, prior)[0]
+    for place in range(len(logs)):
+        others = [*logs[:place], *logs[place + 1 :]]
+        estimates[place] = combine(shared, others, beta, prior)[0]
     return estimates
 
 
@@ -391,25 +358,21 @@ class BlockSums:
     def __init__(self) -> None:
         self._full: list[FloatArray] = []
         self._count = 0
-        self._rest: FloatArray | None = None
+        self._rest: FloatArray | None = None  # stretches that do not fill a sum yet
         self._factor = 1
 
     def add(self, blocks: FloatArray) -> None:
         """Append the sums (b, ...) of the next b stretches."""
         if self._rest is not None:
             blocks = np.concatenate([self._rest, blocks])
-        whole = blocks.shape[0] // self._factor
-        self._rest = blocks[whole * self._factor :]
-        self._append(_added(blocks[: whole * self._factor], self._factor))
-        while self._count > 2 * MOST_BLOCKS:
-            sums = np.concatenate(self._full)
-            odd = sums.shape[0] % 2
-            self._full, self._count = [], 0
-            self._append(_added(sums[: sums.shape[0] - odd], 2))
-            if odd:  # waits, as one entry of the old size, for its partner
-                filler = np.zeros((self._factor - 1,) + sums.shape[1:])
-                self._rest = np.concatenate([sums[-1:], filler, self._rest])
-            self._factor *= 2
+        while count := min(len(blocks) // self._factor, 2 * MOST_BLOCKS - self._count):
+            taken, blocks = np.split(blocks, [count * self._factor])
+            self._full.append(_added(taken, self._factor))
+            self._count += count
+            if self._count == 2 * MOST_BLOCKS:
+                self._full = [_added(np.concatenate(self._full), 2)]
+                self._count, self._factor = MOST_BLOCKS, 2 * self._factor
+        self._rest = blocks
 
     def values(self) -> FloatArray:
         """All sums (B, ...) in time order; the last stretch may be shorter.
@@ -421,21 +384,12 @@ class BlockSums:
         """
         if self._rest is None:
             raise ValueError("no blocks were added")
-        parts = list(self._full)
-        if self._rest.shape[0]:
-            parts.append(self._rest.sum(axis=0, keepdims=True))
-        return np.concatenate(parts)
-
-    def _append(self, sums: FloatArray) -> None:
-        if sums.shape[0]:
-            self._full.append(sums)
-            self._count += sums.shape[0]
+        last = self._rest.sum(axis=0, keepdims=True)[: len(self._rest)]
+        return np.concatenate([*self._full, last])
 
 
 def _added(blocks: FloatArray, factor: int) -> FloatArray:
     """Sums of each `factor` blocks (b, ...) that follow one another."""
-    if factor == 1:
-        return blocks
     return blocks.reshape((-1, factor) + blocks.shape[1:]).sum(axis=1)
 
 

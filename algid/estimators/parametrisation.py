@@ -119,24 +119,19 @@ class Shared:
 
     def jacobian(self, beta: FloatArray, loaded: bool) -> FloatArray:
         """T (q, Q)."""
-        T = np.eye(len(self.log_names), len(self.names))
+        q, Q = len(self.log_names), len(self.names)
+        T = np.eye(q, Q)
         if loaded:
-            m_p, l1, r, _ = self.physical(beta)
-            g = self.model.gravity
             turn, slope = self.turn(beta)
-            up = g * complex(np.cos(turn), np.sin(turn))
-            by: dict[str, tuple[complex, ...]] = {
-                "m_p": (l1**2, abs(r) ** 2, l1 * r, up * l1, up * r),
-                "l1": (2 * m_p * l1, 0.0, m_p * r, m_p * up, 0.0),
-                "l2": (0.0, 2 * m_p * r.real, m_p * l1, 0.0, m_p * up),
-                "y_p": (0.0, 2 * m_p * r.imag, 1j * m_p * l1, 0.0, 1j * m_p * up),
-                "J_p": (0.0, 1.0, 0.0, 0.0, 0.0),
-            }
-            turned = (0.0, 0.0, 0.0, 1j * m_p * up * l1, 1j * m_p * up * r)
+            z = payload_phasors(*self.physical(beta), self.model.gravity, turn)
+            turned = (0.0, 0.0, 0.0, 1j * z[3], 1j * z[4])
             for row, (part, side) in self._rows:
-                T[row, : len(slope)] += getattr(complex(turned[part]), side) * slope
-                for column in range(len(self.log_names), len(self.names)):
-                    T[row, column] = getattr(complex(by[self.names[column]][part]), side)
+                T[row, :q] += getattr(complex(turned[part]), side) * slope
+            # the payload's part is quadratic in each of its parameters: any step is exact
+            for place in range(q, Q):
+                step = np.eye(1, Q, place)[0]
+                ahead, behind = (self.coefficients(beta + own, True) for own in (step, -step))
+                T[:, place] = 0.5 * (ahead - behind)
         return T
 
     @cached_property

@@ -105,16 +105,14 @@ def shared_out(logs: Sequence[LogInformation], groups: Groups) -> list[LogInform
 
 def merged(logs: Sequence[LogInformation], groups: Groups) -> list[LogInformation]:
     """One likelihood for each group, the sum of those of its logs stretch by stretch."""
-    return [_sum([logs[place] for place in group]) for group in groups]
-
-
-def _sum(logs: Sequence[LogInformation]) -> LogInformation:
-    first = logs[0]
-    if len(logs) == 1:
-        return first
-    q, stretches = first.c0.size, max(len(log.S) for log in logs)
-    S, g = np.zeros((stretches, q, q)), np.zeros((stretches, q))
-    for log in logs:
-        S[: len(log.S)] += log.S
-        g[: len(log.g)] += log.g - log.S @ (first.c0 - log.c0)
-    return replace(first, S=S, g=g)
+    sums = []
+    for group in groups:
+        c0 = logs[group[0]].c0
+        own = [logs[place].about(c0) for place in group]
+        longest = max(own, key=lambda log: len(log.S))
+        S, g = np.zeros_like(longest.S), np.zeros_like(longest.g)
+        for log in own:
+            S[: len(log.S)] += log.S
+            g[: len(log.g)] += log.g
+        sums.append(replace(longest, S=S, g=g))
+    return sums

@@ -41,7 +41,7 @@ def test_block_sums_are_of_stretches_one_after_the_other(
         told += block[:, 0].tolist()
     found = sums.values()[:, 0]
     factor = next(f for f in (1, 2, 4, 8, 16, 32, 64) if len(told) <= f * found.size)
-    assert 8 < found.size <= 17
+    assert 8 <= found.size <= 17
     expected = [sum(told[first : first + factor]) for first in range(0, len(told), factor)]
     np.testing.assert_allclose(found, expected, atol=1e-12)
 

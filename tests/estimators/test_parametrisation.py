@@ -61,7 +61,8 @@ def test_a_loaded_log_has_the_constants_of_table_2(
     c = np.array(expected.subs(at)).astype(float)[:, 0]
     np.testing.assert_allclose(shared.coefficients(beta, True), c, rtol=1e-14)
     T = np.array(expected.jacobian(symbols).subs(at)).astype(float)
-    np.testing.assert_allclose(shared.jacobian(beta, True), T, rtol=1e-14, atol=1e-15)
+    # rounding of differences over a unit step
+    np.testing.assert_allclose(shared.jacobian(beta, True), T, rtol=1e-13, atol=1e-14)
     assert shared.physical(beta) == pytest.approx((0.35, 0.2, 0.3, 0.0))
     np.testing.assert_array_equal(shared.coefficients(beta, False), beta[: len(shared.log_names)])
     np.testing.assert_array_equal(
