@@ -115,30 +115,35 @@ def evidence(
     by side: a step costs the same for few as for many.
     """
     logs, settings = [], problem.settings
+    model, delay = settings.model, settings.estimate_delay
     for kind, sources in problem.kinds():
         c0 = shared.coefficients(beta, kind)
         c = c0.copy()
         if shared.delay:
             c[-1] -= settings.shift.delay  # the windows are shifted by it: the column is a change's
+        linear = c[: len(model.names)]
         grams = [BlockSums() for _ in sources]
         rows, lost = np.zeros((2, len(grams)), dtype=np.int64)
         for batch in _batches(sources, settings):
-            if following is None:
-                instruments = _side_by_side(batch, settings, c)
-            else:
-                instruments = _explained(following, batch, settings, c)
-            for (number, _, _), (both, good, moves) in zip(batch, instruments, strict=True):
-                if not moves:
-                    return None
+            motions = _explained(following, batch) if following else _driven(batch, model, linear)
+            for (number, piece, windows), (own, motion, step, good) in zip(
+                batch, motions, strict=True
+            ):
+                X = windows.equations(model, piece, delay, linear)[:, :, ::_STRIDE]
+                Z = own.equations(model, motion, delay, linear)[:, :-1, ::step]
+                used = good
+                if settings.rest is not None:  # a joint that stands
+                    least = np.square(settings.rest)[:, None]
+                    used = good & (windows.square_speeds(piece)[:, ::_STRIDE] >= least)
+                both = np.where(used[..., None, :], np.concatenate([Z, X], axis=1), 0.0)
                 rows[number] += good.size
                 lost[number] += np.sum(~good)
-                own = np.where(good, both, 0.0)
-                grams[number].add(weak.grams(own, OVERLAP // _STRIDE))
+                grams[number].add(weak.grams(both, OVERLAP // _STRIDE))
         if np.any(lost > _FEWEST * rows):
             return None
-        for sums, used in zip(grams, (rows - lost).tolist(), strict=True):
-            if used:
-                logs.append(replace(projected(sums.values(), used, c, kind), c0=c0))
+        for sums, count in zip(grams, (rows - lost).tolist(), strict=True):
+            if count:
+                logs.append(replace(projected(sums.values(), count, c, kind), c0=c0))
     return logs
 
 
@@ -189,62 +194,37 @@ def _stride(dt: float) -> int:
     return int(np.clip(2 ** np.floor(np.log2(max(_STEP / dt, 1.0))), 2, OVERLAP))
 
 
-def _side_by_side(
-    batch: Sequence[_Piece], settings: WeakSettings, c: FloatArray
-) -> Iterator[tuple[FloatArray, NDArray[np.bool_], bool]]:
-    """Each piece's instruments and columns, its good windows, and whether `c` moves the arm.
+_Motion = tuple[Windows, Segment, int, NDArray[np.bool_]]
+"""Windows on a motion, every how many of them count, and which are good."""
 
-    Their shapes are (2, 2 q + 1, R) and (R,).
-    """
-    model, delay = settings.model, settings.estimate_delay
-    linear = c[: len(model.names)]
-    cuts, dt = [], []
-    for _, piece, windows in batch:
-        cuts.append(cut(piece, windows))
-        dt.append(np.full(cuts[-1][0].shape[1], windows.dt))
+
+def _driven(batch: Sequence[_Piece], model: Model, c: FloatArray) -> Iterator[_Motion]:
+    """What the torque and `c` (q,) make of each piece's windows, one window after the other."""
+    cuts = [cut(piece, windows) for _, piece, windows in batch]
+    dt = [
+        np.full(own[0].shape[1], windows.dt)
+        for own, (_, _, windows) in zip(cuts, batch, strict=True)
+    ]
     theta, omega, tau, measured = (
         np.concatenate(parts, axis=1) for parts in zip(*cuts, strict=True)
     )
     start = np.concatenate([theta, omega])
-    states, good, moves = simulated(model, linear, np.concatenate(dt), start, tau, measured)
+    states, good = simulated(model, c, np.concatenate(dt), start, tau, measured)
     last = 0
-    for (_, piece, windows), periods in zip(batch, dt, strict=True):
+    for (_, _, windows), periods in zip(batch, dt, strict=True):
         own = slice(last, last := last + periods.size)
         ends = [rows[:, own].reshape(2, -1) for rows in (states[:2], tau[:, :, :-1], states[2:])]
         motion = Segment(0.0, windows.dt, ends[0], ends[1], ends[2])
-        columns = windows.equations(model, piece, delay, linear)
-        plain = Windows(windows.dt, windows.length, 0.0, None)
-        Z = plain.equations(model, motion, delay, linear)[:, :-1, ::OVERLAP]
-        both = np.concatenate([Z, columns[:, :, ::_STRIDE]], axis=1)
-        both = np.where(_moving(windows, piece, settings)[:, None], both, 0.0)
-        yield both, good[own], bool(np.all(moves[own]))
+        yield Windows(windows.dt, windows.length, 0.0, None), motion, OVERLAP, good[own]
 
 
-def _explained(
-    following: Following, batch: Sequence[_Piece], settings: WeakSettings, c: FloatArray
-) -> Iterator[tuple[FloatArray, NDArray[np.bool_], bool]]:
-    """As `_side_by_side`, along the motion that the reference explains."""
-    linear = c[: len(settings.model.names)]
+def _explained(following: Following, batch: Sequence[_Piece]) -> Iterator[_Motion]:
+    """What the reference explains of each piece; of one without, no window is good."""
     for _, piece, windows in batch:
-
-        def equations(motion: Segment, windows: Windows = windows) -> FloatArray:
-            made = windows.equations(settings.model, motion, settings.estimate_delay, linear)
-            return made[:, :, ::_STRIDE]
-
-        X, motion = equations(piece), following.motion(piece)
-        Z = np.zeros_like(X)
-        if motion is not None:
-            Z = equations(motion)
-        both = np.concatenate([Z[:, :-1], X], axis=1)
-        both = np.where(_moving(windows, piece, settings)[:, None], both, 0.0)
-        yield both, np.full(X.shape[2], motion is not None), True
-
-
-def _moving(windows: Windows, piece: Segment, settings: WeakSettings) -> NDArray[np.bool_]:
-    """Windows (2, R) in which a joint does not stand: see `WeakSettings.rest`."""
-    if settings.rest is None:
-        return np.ones((2, 1), dtype=bool)
-    return windows.square_speeds(piece)[:, ::_STRIDE] >= np.square(settings.rest)[:, None]
+        motion = following.motion(piece)
+        count = (len(piece) - 2 * windows.margin) // windows.step - OVERLAP
+        good = np.full(count // _STRIDE + 1, motion is not None)
+        yield windows, motion or piece, _STRIDE, good
 
 
 def cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -281,7 +261,7 @@ def simulated(
     start: FloatArray,
     tau: FloatArray,
     measured: FloatArray,
-) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
+) -> tuple[FloatArray, NDArray[np.bool_]]:
     """The motion that windows cut from logs would have had, of samples `dt` (R,) s apart.
 
     Runge-Kutta's fourth order in steps of some `_STEP` s, all windows side by side, from the
@@ -290,8 +270,8 @@ def simulated(
 
     Returns
     -------
-    Angles and velocities (4, R, L), the windows (R,) that have not run away, and those (R,) on
-    which the mass matrix is positive definite
+    Angles and velocities (4, R, L), and the windows (R,) that have not gone astray: their mass
+    matrix is positive definite all along, and they end near the measured ones
     """
     stride = _stride(float(dt[0]))
     h = stride * dt
@@ -310,12 +290,12 @@ def simulated(
             parts.append((x, ahead, h * first, h * last))
             x = np.clip(ahead, -1e6, 1e6)
     states = _cubic(np.moveaxis(np.array(parts), 0, -1), inside)
-    good = np.abs(states[:2] - measured).max(axis=(0, 2)) < _ASTRAY
     (m11, m12), (_, m22) = inertia(model, c, states[:2, :, ::stride])
-    moves = np.all((m11 > 0) & (m11 * m22 > m12**2), axis=-1)
-    # A window that ran away is left out; products of its velocities would overflow.
+    good = np.all((m11 > 0) & (m11 * m22 > m12**2), axis=-1)
+    good &= np.abs(states[:2] - measured).max(axis=(0, 2)) < _ASTRAY
+    # A window that went astray is left out; products of its velocities would overflow.
     states[:, ~good] = 0.0
-    return states, good, moves
+    return states, good
 
 
 def _cubic(parts: FloatArray, s: FloatArray) -> FloatArray:
