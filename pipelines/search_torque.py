@@ -121,7 +121,7 @@ def shares(
         if known_k6 is not None:
             unknown, rhs = np.delete(unknown, 3, axis=0), rhs - known_k6[:, None] * terms.viscous1
         rows = stack_rows(np.concatenate([unknown, rhs[None]]), DT, len(unknown))[..., judged]
-        x = solve_scaled(rows[:, :-1], rows[:, -1]).x
+        x, _ = solve_scaled(rows[:, :-1], rows[:, -1])
         return np.where(np.isnan(x).any(axis=-1), np.inf, np.median(np.nan_to_num(x), axis=-1))
 
     with np.errstate(all="ignore"):

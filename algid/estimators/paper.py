@@ -26,7 +26,7 @@ trusted.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -133,15 +133,7 @@ def stack_rows(first: FloatArray, dt: float, rows: int) -> FloatArray:
 LARGEST_CONDITION = 1e10
 
 
-@dataclass(frozen=True, eq=False)
-class Solutions:
-    """Solutions (u, ...) of systems of u unknowns, NaN if singular; condition numbers (...)."""
-
-    x: FloatArray
-    condition: FloatArray
-
-
-def solve_scaled(matrix: FloatArray, rhs: FloatArray) -> Solutions:
+def solve_scaled(matrix: FloatArray, rhs: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Solve P x = q at every sample.
 
     Parameters
@@ -153,46 +145,33 @@ def solve_scaled(matrix: FloatArray, rhs: FloatArray) -> Solutions:
 
     Returns
     -------
-    Solutions
+    Solutions (u, ...) of u unknowns, and condition numbers (...)
         The condition number is that of the scaled matrix in the 1-norm; past `LARGEST_CONDITION`
         the system counts as singular and its solution is NaN.
     """
+
+    def scale(sizes: FloatArray) -> FloatArray:
+        return 1 / np.where(sizes > 0, sizes, 1.0)
+
+    def norm(matrix: FloatArray) -> FloatArray:
+        return np.asarray(np.abs(matrix).sum(axis=-2).max(axis=-1))
+
     p = np.moveaxis(matrix, (0, 1), (-2, -1))
-    q = np.moveaxis(rhs, 0, -1)[..., None]
-    row = _scale(np.abs(p).max(axis=-1, keepdims=True))
+    row = scale(np.abs(p).max(axis=-1, keepdims=True))
     p = p * row
-    column = _scale(np.abs(p).max(axis=-2, keepdims=True))
+    column = scale(np.abs(p).max(axis=-2, keepdims=True))
     p = p * column
-    regular = np.asarray((p != 0).any(axis=-1).all(axis=-1))  # windows start with rows of zeros
-    try:
-        inverse = _inverse_where(p, regular)
-    except np.linalg.LinAlgError:  # LAPACK refuses a whole batch for one singular matrix
-        # the same factors, the same zero pivots
-        regular = np.asarray(np.linalg.slogdet(p).sign != 0)
-        inverse = _inverse_where(p, regular)
+    q = np.moveaxis(rhs, 0, -1)[..., None] * row
+    # windows start with rows of zeros; LAPACK refuses a whole batch for one zero pivot
+    regular = np.asarray(np.linalg.slogdet(p).sign != 0)
+    inverse = np.linalg.inv(np.where(regular[..., None, None], p, np.eye(p.shape[-1])))
     # next to singular: caught by the condition number
     with np.errstate(over="ignore", invalid="ignore"):
-        scaled = inverse @ (q * row)
-        scaled += inverse @ (q * row - p @ scaled)
-        condition = np.where(regular, _norm1(p) * _norm1(inverse), np.inf)
+        scaled = inverse @ q
+        scaled += inverse @ (q - p @ scaled)
+        condition = np.where(regular, norm(p) * norm(inverse), np.inf)
     x = np.where((condition <= LARGEST_CONDITION)[..., None, None], scaled * column.mT, np.nan)
-    return Solutions(x=np.moveaxis(x[..., 0], -1, 0), condition=condition)
-
-
-def _scale(largest: FloatArray) -> FloatArray:
-    return 1 / np.where(largest > 0, largest, 1.0)
-
-
-def _norm1(matrix: FloatArray) -> FloatArray:
-    norms: FloatArray = np.abs(matrix).sum(axis=-2).max(axis=-1)
-    return norms
-
-
-def _inverse_where(p: FloatArray, regular: NDArray[np.bool_]) -> FloatArray:
-    """Inverses of matrices (..., n, n), the identity in the place of those that are not regular."""
-    if not regular.all():
-        p = np.where(regular[..., None, None], p, np.eye(p.shape[-1]))
-    return np.linalg.inv(p)
+    return np.moveaxis(x[..., 0], -1, 0), condition
 
 
 EPSILON = 0.2  # s: the estimates are arbitrary before (the paper's ε)
@@ -216,20 +195,23 @@ def stage1(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> 
         NaN in the first ε of each window, and where a system is singular.
     """
     terms = columns(theta, omega, tau, dt)
-    solution = _solved_late(np.stack(terms[:7]), dt)
-    k5_k3, k1, k3, k6, k4, k2 = solution.x
+    x, condition = _solved_late(np.stack(terms[:7]), dt)
+    k5_k3, k1, k3, k6, k4, k2 = x
     known = k3 * (terms.inertia1 + terms.inertia2) + k1 * terms.coupling2 + k2 * terms.gravity12
     k7, k7_condition = _single_unknown(terms.viscous2, terms.torque2 - known)
     k = [k1, k2, k3, k4, k5_k3 - k3, k6, k7]
-    return np.stack([*k, k5_k3, solution.condition, k7_condition])
+    return np.stack([*k, k5_k3, condition, k7_condition])
 
 
-def _solved_late(first: FloatArray, dt: float) -> Solutions:
-    """Solution (u, ..., n) of the system with first row and right side `first`: NaN before ε."""
+def _solved_late(first: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
+    """Solution (u, ..., n) of the system with first row and right side `first`: NaN before ε.
+
+    With its condition numbers.
+    """
     rows = stack_rows(first, dt, len(first) - 1)
-    solution = solve_scaled(rows[:, :-1], rows[:, -1])
-    solution.x[..., : int(np.ceil(EPSILON / dt - 1e-6))] = np.nan
-    return solution
+    x, condition = solve_scaled(rows[:, :-1], rows[:, -1])
+    x[..., : int(np.ceil(EPSILON / dt - 1e-6))] = np.nan
+    return x, condition
 
 
 def _single_unknown(coefficient: FloatArray, rhs: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -266,8 +248,8 @@ def stage2(
     terms = columns(theta, omega, tau, dt)
     rest = terms.torque1 - k[5] * terms.viscous1
     unknown = [terms.inertia1, terms.coupling1, terms.inertia2, terms.gravity1, terms.gravity12]
-    solution = _solved_late(np.stack([*unknown, rest]), dt)
-    return np.stack([*solution.x, *payload(solution.x, k, gravity), solution.condition])
+    x, condition = _solved_late(np.stack([*unknown, rest]), dt)
+    return np.stack([*x, *payload(x, k, gravity), condition])
 
 
 def payload(x: FloatArray, k: FloatArray, gravity: float) -> tuple[FloatArray, FloatArray]:
@@ -310,6 +292,19 @@ class PaperSeries:
     values: FloatArray
     settled: int
 
+    @property
+    def quartiles(self) -> FloatArray:
+        """Quartiles (3, s) of what is settled and no NaN (singular, before ε)."""
+        settled = self.values[:, -self.settled :]
+        quartiles = np.full((3, len(settled)), np.nan)
+        some = np.isfinite(settled).any(axis=1)
+        if some.any():
+            usable = settled[some]
+            # the former goes row by row
+            quantile = np.nanquantile if np.isnan(usable).any() else np.quantile
+            quartiles[:, some] = quantile(usable, [0.25, 0.5, 0.75], axis=1)
+        return quartiles
+
 
 def series_of(source: Iterable[Segment], window: float, stage: Stage) -> Iterator[PaperSeries]:
     """Series of a stage over the windows of a log.
@@ -323,9 +318,10 @@ def series_of(source: Iterable[Segment], window: float, stage: Stage) -> Iterato
     """
     for batch in _batches(pieces_of(source, window, least=8)):
         dt = batch[0].dt
-        theta = np.stack([window.theta for window in batch], axis=1)
-        tau = np.stack([window.tau for window in batch], axis=1)
-        omega = np.stack([window.omega for window in batch if window.omega is not None], axis=1)
+        theta, tau, omega = (
+            np.stack([getattr(window, signal) for window in batch], axis=1)
+            for signal in ("theta", "tau", "omega")
+        )
         values = stage(theta, omega, tau, dt)
         for index, piece in enumerate(batch):
             yield PaperSeries(t=piece.t, values=values[:, index], settled=round(SETTLED / dt))
@@ -349,41 +345,20 @@ def _batches(windows: Iterable[Segment]) -> Iterator[list[Segment]]:
         yield batch
 
 
-class Summary:
-    """Gathers the windows' settled medians; `estimates` is what the series come to."""
+def estimates(quartiles: Sequence[FloatArray], size: int) -> tuple[FloatArray, FloatArray]:
+    """Estimates (s,) by windows' `quartiles`, and how far they wander (s,), NaN where none.
 
-    def __init__(self, size: int) -> None:
-        self._quartiles: list[FloatArray] = []
-        self._size = size
-
-    def add(self, series: PaperSeries) -> None:
-        """Take in one window; samples that are NaN (singular, before ε) do not count."""
-        settled = series.values[:, -series.settled :]
-        quartiles = np.full((3, self._size), np.nan)
-        some = np.isfinite(settled).any(axis=1)
-        if some.any():
-            usable = settled[some]
-            # the former goes row by row
-            quantile = np.nanquantile if np.isnan(usable).any() else np.quantile
-            quartiles[:, some] = quantile(usable, [0.25, 0.5, 0.75], axis=1)
-        self._quartiles.append(quartiles)
-
-    def estimates(self) -> tuple[FloatArray, FloatArray]:
-        """Estimates (s,) and how far they wander (s,), half the distance of the quartiles.
-
-        NaN where none.
-        """
-        if not self._quartiles:
-            return np.full(self._size, np.nan), np.full(self._size, np.nan)
-        low, middle, high = np.stack(self._quartiles, axis=-1)
-        estimate, wander = np.full((2, self._size), np.nan)
-        some = np.isfinite(middle).any(axis=1)
-        if some.any():
-            estimate[some] = np.nanmedian(middle[some], axis=1)
-            within = np.nanmedian(high[some] - low[some], axis=1)
-            between = np.subtract(*np.nanquantile(middle[some], [0.75, 0.25], axis=1))
-            wander[some] = 0.5 * np.maximum(within, between)
-        return estimate, wander
+    They wander by half the distance of the quartiles, within windows or between them.
+    """
+    low, middle, high = np.stack([np.full((3, size), np.nan), *quartiles], axis=-1)
+    estimate, wander = np.full((2, size), np.nan)
+    some = np.isfinite(middle).any(axis=1)
+    if some.any():
+        estimate[some] = np.nanmedian(middle[some], axis=1)
+        within = np.nanmedian(high[some] - low[some], axis=1)
+        between = np.subtract(*np.nanquantile(middle[some], [0.75, 0.25], axis=1))
+        wander[some] = 0.5 * np.maximum(within, between)
+    return estimate, wander
 
 
 def wanders(estimate: FloatArray, wander: FloatArray) -> NDArray[np.bool_]:

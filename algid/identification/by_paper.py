@@ -20,7 +20,7 @@ from algid.estimators.paper import (
     STAGE2_NAMES,
     STAGE2_SERIES,
     PaperSeries,
-    Summary,
+    estimates,
     series_of,
     stage1,
     stage2,
@@ -125,13 +125,13 @@ def _estimate(
     else:
         names, file = STAGE2_SERIES, STAGE2_FILE
         series = series_of(moving, window, partial(stage2, k=k, gravity=settings.gravity))
-    summary = Summary(len(names))
+    quartiles = list[FloatArray]()
 
     def columns() -> Iterator[dict[str, FloatArray]]:
         """Blocks of whole windows, each of some `ROWS` samples."""
         gathered, rows = list[PaperSeries](), 0
         for one in series:
-            summary.add(one)
+            quartiles.append(one.quartiles)
             gathered.append(one)
             rows += one.t.size
             if rows >= ROWS:
@@ -151,7 +151,7 @@ def _estimate(
             f"{log.name}: {duration:.3g} s long; the paper's method needs {SHORTEST:g} s at least "
             "to settle; record longer"
         )
-    estimate, wander = summary.estimates()
+    estimate, wander = estimates(quartiles, len(names))
     return estimate, wander, ~wanders(estimate, wander)
 
 

@@ -12,8 +12,8 @@ from algid.arm import FloatArray, inverse_dynamics
 from algid.estimators import paper
 from algid.estimators.paper import (
     PaperSeries,
-    Summary,
     columns,
+    estimates,
     wanders,
 )
 from algid.synth.cases import load_case
@@ -80,24 +80,22 @@ def test_joint_2_at_rest_leaves_k7_open_and_its_condition_infinite() -> None:
     assert np.isnan(found[6]).all()
 
 
-def _series(*rows: list[float]) -> PaperSeries:
+def _quartiles(*rows: list[float]) -> FloatArray:
     values = np.array(rows)
-    return PaperSeries(np.arange(values.shape[1]) * 0.1, values, settled=4)
+    return PaperSeries(np.arange(values.shape[1]) * 0.1, values, settled=4).quartiles
 
 
 def test_an_estimate_is_the_median_of_medians_and_wanders_by_half_its_quartiles() -> None:
-    summary = Summary(3)
-    nothing = summary.estimates()
-    assert np.isnan(nothing).all()
+    assert np.isnan(estimates([], 3)).all()
     nan = np.nan
     # what is not settled counts nothing
-    summary.add(_series([99, 1, 2, 3, 4], [9, nan, 5, 5, 5], [nan] * 5))
-    estimate, wander = summary.estimates()
+    windows = [_quartiles([99, 1, 2, 3, 4], [9, nan, 5, 5, 5], [nan] * 5)]
+    estimate, wander = estimates(windows, 3)
     np.testing.assert_allclose(estimate, [2.5, 5, nan])
     np.testing.assert_allclose(wander, [0.5 * (3.25 - 1.75), 0, nan])
-    summary.add(_series([0, 7, 7, 7, 7], [0, nan, nan, nan, nan], [nan] * 5))
-    summary.add(_series([0, 3, 3, 3, 3], [0, 1, 1, 1, 1], [nan] * 5))
-    estimate, wander = summary.estimates()
+    windows.append(_quartiles([0, 7, 7, 7, 7], [0, nan, nan, nan, nan], [nan] * 5))
+    windows.append(_quartiles([0, 3, 3, 3, 3], [0, 1, 1, 1, 1], [nan] * 5))
+    estimate, wander = estimates(windows, 3)
     np.testing.assert_allclose(estimate, [3, 3, nan])  # medians 2.5, 7, 3 and 5, 1
     # between windows more than within
     np.testing.assert_allclose(wander, [0.5 * (5 - 2.75), 0.5 * (4 - 2), nan])
