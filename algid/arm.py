@@ -236,31 +236,3 @@ def forward_dynamics(
     free1, free2 = tau - passive_torque(k, theta, omega)
     determinant = m11 * m22 - m12 * m12
     return np.stack([m22 * free1 - m12 * free2, m11 * free2 - m12 * free1]) / determinant
-
-
-def regressor(theta: FloatArray, omega: FloatArray, alpha: FloatArray) -> FloatArray:
-    """Y (2, 7, ...) with τ = Y k: eq. (1) is linear in the constants of Table 1."""
-    theta1, theta2 = theta
-    omega1, omega2 = omega
-    alpha1, alpha2 = alpha
-    c2, s2 = np.cos(theta2), np.sin(theta2)
-    c12 = np.cos(theta1 + theta2)
-    zeros = np.zeros_like(c2)
-    return np.stack(
-        [
-            np.stack(
-                [
-                    c2 * (2 * alpha1 + alpha2) - s2 * (2 * omega1 + omega2) * omega2,
-                    c12,
-                    alpha1 + alpha2,
-                    np.cos(theta1),
-                    alpha1,
-                    omega1,
-                    zeros,
-                ]
-            ),
-            np.stack(
-                [c2 * alpha1 + s2 * omega1**2, c12, alpha1 + alpha2, zeros, zeros, zeros, omega2]
-            ),
-        ]
-    )

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from algid.arm import Arm, FloatArray, regressor, with_payload
+from algid.arm import Arm, FloatArray, inverse_dynamics, with_payload
 from algid.log import Log, Origin, Reading
 from algid.signals.segments import Segment
 from algid.synth.cases import Case, load_case
@@ -142,7 +142,8 @@ def _inverse_dynamics(log: Segment, cutoff: float) -> FloatArray:
     sections = butter(4, cutoff, fs=1 / log.dt, output="sos")
     theta, tau = sosfiltfilt(sections, np.stack([log.theta, log.tau]), axis=-1)
     omega = np.gradient(theta, log.dt, axis=1)
-    Y = regressor(theta, omega, np.gradient(omega, log.dt, axis=1))
+    alpha = np.gradient(omega, log.dt, axis=1)
+    Y = np.stack([inverse_dynamics(k, theta, omega, alpha) for k in np.eye(7)], axis=1)
     # Filtered alike, as Gautier's practice is: the regressor's products pass the same filter as
     # the torque.
     Y = sosfiltfilt(sections, Y, axis=-1)

@@ -26,7 +26,7 @@ from itertools import chain, combinations, product
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from algid.arm import CONSTANT_NAMES, FloatArray, regressor
+from algid.arm import CONSTANT_NAMES, FloatArray, inverse_dynamics
 from algid.signals.segments import Segment
 
 NAMES = (*CONSTANT_NAMES, "f1", "f2", "o1", "o2", "j2", "k1s", "k2s", "k4s")
@@ -70,6 +70,11 @@ def _below(cutoff: float, dt: float, signals: FloatArray) -> FloatArray:
     return np.asarray(
         sosfiltfilt(butter(4, min(cutoff, highest), fs=1 / dt, output="sos"), signals, axis=-1)
     )
+
+
+def regressor(theta: FloatArray, omega: FloatArray, alpha: FloatArray) -> FloatArray:
+    """Y (2, 7, N) with τ = Y k, a column for each constant of Table 1."""
+    return np.stack([inverse_dynamics(k, theta, omega, alpha) for k in np.eye(7)], axis=1)
 
 
 def columns(motion: Motion, width: float = WIDTH) -> FloatArray:

@@ -14,7 +14,6 @@ from algid.arm import (
     inverse_dynamics,
     mass_matrix,
     read_only,
-    regressor,
     with_payload,
 )
 from algid.synth.cases import load_case
@@ -82,13 +81,6 @@ def test_forward_dynamics_inverts_inverse_dynamics() -> None:
     np.testing.assert_allclose(
         forward_dynamics(k, theta, omega, tau), alpha, rtol=1e-10, atol=1e-10
     )
-
-
-def test_regressor_times_constants_is_the_torque() -> None:
-    k = load_case("case2").arm.constants()
-    theta, omega, alpha = states()
-    torque = np.einsum("jkn,k->jn", regressor(theta, omega, alpha), k)
-    np.testing.assert_allclose(torque, inverse_dynamics(k, theta, omega, alpha), atol=1e-12)
 
 
 def test_constants_of_case_1_follow_table_1() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from algid.arm import FloatArray, forward_dynamics, regressor, with_payload
+from algid.arm import FloatArray, forward_dynamics, inverse_dynamics, with_payload
 from algid.identification.identify import identify
 from algid.identification.open_logs import open_source
 from algid.identification.recordings import Recordings, Role
@@ -61,7 +61,9 @@ def low(x: FloatArray) -> FloatArray:
 def columns(motion: SimulatedMotion, k: FloatArray = K) -> FloatArray:
     """The paper's regressor (7, 2, N) on the true motion, below 5 Hz."""
     alpha = forward_dynamics(k, motion.theta, motion.omega, motion.tau)
-    return low(np.moveaxis(np.asarray(regressor(motion.theta, motion.omega, alpha)), 1, 0))
+    return low(
+        np.stack([inverse_dynamics(k, motion.theta, motion.omega, alpha) for k in np.eye(7)])
+    )
 
 
 def known(k: FloatArray, shift: float = 0.0) -> Predictor:
