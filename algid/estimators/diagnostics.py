@@ -30,6 +30,7 @@ from algid.estimators.combine import (
     likelihood,
     of_kind,
     scaled_pinv,
+    scores_of,
 )
 from algid.estimators.fit import Fit, Status, alone
 from algid.estimators.identifiability import sizes
@@ -195,28 +196,23 @@ def constrained(fit: Fit) -> Fit:
         value, gradient, _ = likelihood(fit.shared, fit.logs, fit.values + scale * x, fit.prior)
         return -value / unit, -gradient * scale / unit
 
-    def margin(
-        bound: Callable[[FloatArray], float], slope: float, inside: float, x: FloatArray
-    ) -> float:
-        return bound(fit.values + scale * x) / slope - inside
+    limits = list(bounds(fit.shared).values())
+    steepness = [np.linalg.norm(_slope(bound, fit.values, size) * size) or 1.0 for bound in limits]
 
-    held = []
-    for bound in bounds(fit.shared).values():
-        steepness = float(np.linalg.norm(_slope(bound, fit.values, size) * size))
-        held.append((bound, steepness or 1.0))
+    def margins(x: FloatArray, inside: float) -> FloatArray:
+        values = [bound(fit.values + scale * x) for bound in limits]
+        return np.array(values) / steepness - inside
+
     x, disobeyed = np.zeros(scale.size), enforced
     options = {"maxiter": 500, "ftol": 1e-12}
     for inside in _INSIDE:
-        demands = []
-        for bound, slope in held:
-            demands.append({"type": "ineq", "fun": partial(margin, bound, slope, inside)})
         unit = 1 + abs(cost(x, 1.0)[0])  # the solver's tolerances are absolute
         solution = minimize(
             partial(cost, unit=unit),
             x,
             jac=True,
             method="SLSQP",
-            constraints=demands,
+            constraints={"type": "ineq", "fun": partial(margins, inside=inside)},
             options=options,
         )
         if not np.all(np.isfinite(solution.x)):
@@ -397,13 +393,12 @@ def repeatability(fit: Fit) -> tuple[FloatArray, float, tuple[float, float]] | N
     place = fit.names.index("m_p")
     masses = []
     for log in loaded:
-        slope = fit.shared.jacobian(fit.values, True)[:, place]
-        S, g = log.total
-        information = float(slope @ S @ slope)
+        T, scores = scores_of(fit.shared, log, fit.values)
+        slope = T[:, place]
+        information = float(slope @ log.total[0] @ slope)
         if information <= 0:
             return None
-        change = fit.shared.coefficients(fit.values, True) - log.c0
-        masses.append(fit.values[place] + float(slope @ (g - S @ change)) / information)
+        masses.append(fit.values[place] + float(np.sum(scores @ slope)) / information)
     freedom = len(masses) - 1
     std = float(np.std(masses, ddof=1))
     low = std * float(np.sqrt(freedom / chi2_exceeded(freedom, 0.025)))

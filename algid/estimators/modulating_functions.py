@@ -22,7 +22,7 @@ window.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 
@@ -194,9 +194,12 @@ class Windows:
             if bends is not None:
                 bends[:, whole] += here[share] / (here[whole] or 1.0) * X[:, share]
         if at is not None and attributes(model, "by_load"):
-            place = model.compiled.place
-            for name, joint, dissipated in self._dissipated(model, at, theta, motion().omega):
-                X[joint, place[name]] = self.moments(dissipated[None], self._plain[0])[0]
+            omega = motion().omega
+            L = load(model, at, Motion(theta, omega, np.gradient(omega, self.dt, axis=1)))
+            for name, joint in attributes(model, "by_load"):
+                dissipated = np.abs(L[joint]) * np.tanh(omega[joint] / model.coulomb_speed)
+                place = model.compiled.place[name]
+                X[joint, place] = self.moments(dissipated[None], self._plain[0])[0]
         X *= gains(model, here)[:, None, None]
         X[:, -1] = self._of_torque(tau, 0, known)
         if at is not None:
@@ -277,53 +280,25 @@ class Windows:
         compiled, shape, own = model.compiled, model.shape, self._own
 
         def key(order: int, product: Product) -> Hashable:
-            return own, order, product, tuple(getattr(shape, name) for name in _shapes(product))
+            widths = tuple(getattr(shape, name) for name in _shapes(product))
+            return own, order, product, widths
 
-        parts = tuple(enumerate((compiled.f, compiled.p, compiled.s)))
-        missing = []
+        values: Values | None = None
         for order, products in enumerate(compiled.products):
-            missing.append([one for one in products if key(order, one) not in known])
-        if any(missing):
-            values = Values(motion(), shape)
-            for order, products in enumerate(missing):
-                self._learn(products, order, values, samples, known, key)
-        for order, entries in parts:
+            missing = [product for product in products if key(order, product) not in known]
+            if missing:
+                values = values or Values(motion(), shape)
+                signals = np.empty((len(missing), samples))
+                for signal, product in zip(signals, missing, strict=True):
+                    signal[:] = values.of(product)
+                moments = self.moments(signals, self._plain[order])
+                known.update(zip([key(order, one) for one in missing], moments, strict=True))
+        for order, entries in enumerate((compiled.f, compiled.p, compiled.s)):
             for joint, place, entry in entries:
                 for product, factor in entry.products.items():
                     # a window's integral is one, its derivatives' are nothing
                     moment = known[key(order, product)] if product else float(order == 0)
                     X[joint, place] += (-1) ** order * factor * moment
-
-    def _learn(
-        self,
-        products: list[Product],
-        order: int,
-        values: Values,
-        samples: int,
-        known: Known,
-        key: Callable[[int, Product], Hashable],
-    ) -> None:
-        """Add to `known` the moments of `products` of n samples, by the `order`-th kernel."""
-        if not products:
-            return
-        signals = np.empty((len(products), samples))
-        for signal, product in zip(signals, products, strict=True):
-            signal[:] = values.of(product)
-        for product, moment in zip(
-            products, self.moments(signals, self._plain[order]), strict=True
-        ):
-            known[key(order, product)] = moment
-
-    def _dissipated(
-        self, model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray
-    ) -> Iterator[tuple[str, int, FloatArray]]:
-        """Name, joint and |L| tanh(ω / ω_s) (N,) of each parameter by load; `c` gives load L."""
-        shared = attributes(model, "by_load")
-        if not shared:
-            return
-        L = load(model, c, Motion(theta, omega, np.gradient(omega, self.dt, axis=1)))
-        for name, joint in shared:
-            yield name, joint, np.abs(L[joint]) * np.tanh(omega[joint] / model.coulomb_speed)
 
     def square_speeds(self, piece: Segment) -> FloatArray:
         """Each joint's squared velocity (2, R) in (rad/s)², averaged over `equations` windows."""

@@ -23,11 +23,11 @@ in open loop. Both are compared with the same terms and the same prior, and the 
 torque after it:
 
     h  = dᵀ V⁻¹ d,   d = β_instruments − β_least squares          χ² of the number of constants
-    r_l = Σ e(t) y(t + l) / (Σ_k N γ_e(k) γ_y(k))^½               normal, where no torque answers
+    r_l = Σ e(t) y(t + l) / v_l^½                                 normal, where no torque answers
 
 V is the long-run variance of the difference of both estimates' influences, window by window
-(Durbin, Wu & Hausman, in the form that needs no efficient estimate: Wooldridge 2010, §6.3.1); the
-variance of a cross-correlation is Bartlett's 1946.
+(Durbin, Wu & Hausman, in the form that needs no efficient estimate: Wooldridge 2010, §6.3.1), and
+v_l that of the products.
 
 ======  ===============================================================  =========  ===============
 symbol  name                                                             shape      unit
@@ -38,7 +38,7 @@ m, s    the prior's mean, and the spread that physics allows, of a term  (m,)   
 τ       the spread that the logs show, at most s                         (m,)       its own
 φ       overdispersion: variance of the scores over the information      scalar     1
 e, y    residual of the instruments' windows, torque's moment            (2, R)     N m
-γ       autocovariances, lag by lag                                      (K, 2)     (N m)²
+v       long-run variance of the products' sum, lag by lag              (L, 2)     (N m)⁴
 ======  ===============================================================  =========  ===============
 """
 
@@ -98,7 +98,6 @@ Below that an interval loses less than 5 points of its coverage.
 """
 _NEAR = 0.5  # of them: nearer, instruments are not simulated again
 _LAGS = 8  # steps between windows, two windows in all
-_MEMORY = 40  # lags of the autocovariances
 
 
 def fit(problem: Problem) -> Fit:
@@ -485,16 +484,15 @@ def shrink(
     beta, share = start
     places = list(map(shared.names.index, expected.names))
     terms = np.array(expected.terms)
+    alike = np.equal.outer(terms, terms).astype(np.float64)
     logs, _ = by_kind(logs)
     for _ in range(_STEPS):
         beta, H, _ = combine(shared, logs, beta, joined(known, expected.prior(share)))
         variance = np.diag(scaled_pinv(H))[places]
         square = ((beta[places] - expected.mean) ** 2 + variance) / expected.spread**2
-        better = np.empty(len(terms))
-        for place, (term, usual) in enumerate(zip(terms, expected.usual, strict=True)):
-            # of n squares of a term, and one more of the usual size that it shrinks to
-            own = square[terms == term]
-            better[place] = min(1.0, np.sqrt((np.sum(own) + usual**2) / (own.size + 1)))
+        # of n squares of a term, and one more of the usual size that it shrinks to
+        mean = (alike @ square + expected.usual**2) / (alike.sum(axis=1) + 1)
+        better = np.minimum(1.0, np.sqrt(mean))
         change = float(np.max(np.abs(np.log(better / np.maximum(share, _LEAST))), initial=0.0))
         share = better
         if change < _SETTLED:
@@ -542,7 +540,7 @@ def feedback(p_value: float) -> Notice:
 def no_feedback(fit: Fit, problem: Problem) -> float:
     """Bonferroni p value of the residual's correlations with later torques without feedback."""
     settings = problem.at(fit.shared.model, fit.delay).settings
-    products, variance = np.zeros((_LAGS, 2)), np.zeros(2)
+    products, variance = np.zeros((2, 2 * _LAGS))
     for kind, sources in problem.kinds():
         for source in sources:
             c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
@@ -559,19 +557,11 @@ def no_feedback(fit: Fit, problem: Problem) -> float:
 
 
 def _crossed(e: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sums (L, 2) of products of residuals and torques l = 1 … L windows later; variances (2,)."""
-    count = e.shape[1]
-    memory = min(_MEMORY, count // 3)
-
-    def products(x: FloatArray, later: FloatArray, lags: range) -> FloatArray:
-        """Sums (lags, 2) of products of one signal and another, `lags` windows later."""
-        return np.array([np.sum(x[:, : count - lag] * later[:, lag:], axis=1) for lag in lags])
-
-    covariance_e = products(e, e, range(memory)) / count
-    covariance_y = products(y, y, range(memory)) / count
-    both = covariance_e * covariance_y
-    variance = count * np.maximum(both[0] + 2 * both[1:].sum(axis=0), both[0])
-    return products(e, y, range(1, _LAGS + 1)), variance
+    """Sums (2 L,) of products of residuals and torques 1 … L windows later, and variances."""
+    count = e.shape[1] - _LAGS
+    products = [e[:, :count] * y[:, lag : lag + count] for lag in range(1, _LAGS + 1)]
+    later = np.concatenate(products).T
+    return later.sum(axis=0), np.diag(long_run_variance(later)[0])
 
 
 def with_feedback_noted(fit: Fit, problem: Problem) -> Fit:

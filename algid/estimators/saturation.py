@@ -162,26 +162,20 @@ def _judged(
     own = np.arange(first + 2 * number, first + 2 * number + 2)
     c, (log,) = solve([normal])
     inverse = scaled_pinv(log.total[0])
-    covariance = (inverse @ long_run_variance(log.g)[0] @ inverse)[np.ix_(own, own)]
-    h = -c[own]
+    sandwich = inverse @ long_run_variance(log.g)[0] @ inverse
+    covariance, alone = sandwich[np.ix_(own, own)], inverse[np.ix_(own, own)]
+    h, residual = -c[own], np.append(-c, 1.0)
     total = normal.gram.sum(axis=0)[one.joint]
-
-    def left(total: FloatArray, c: FloatArray) -> float:
-        v = np.append(-c, 1.0)
-        return float(v @ total @ v)
-
-    after = left(total, c)
-    explained = after < (1 - _EXPLAINED) * total[-1, -1]
+    explained = bool(residual @ total @ residual < (1 - _EXPLAINED) * total[-1, -1])
     every = np.abs(plateaus)
     mean = every.sum(axis=1) / max(float(every[0].sum()), 1.0)
     excess, std = float(mean @ h), float(np.sqrt(max(mean @ covariance @ mean, 0.0)))
-    rest = np.delete(np.arange(len(total)), own)
-    without = replace(normal, gram=normal.gram[:, :, rest[:, None], rest])
-    before = left(total[np.ix_(rest, rest)], solve([without])[0])
+    # what h takes off the squares over their variance, beside what it leaves of them
+    taken, left = float(h @ scaled_pinv(alone) @ h), 2.0 / OVERLAP * normal.rows[one.joint]
     cut_off = (
         excess > 0
         and float(h @ scaled_pinv(covariance) @ h) > _CERTAIN**2
-        and after < (1 - _SHARE) * before
+        and taken > _SHARE * (taken + left)
         and explained
         and bool(np.all(c[inertias] > 0))
     )
