@@ -712,11 +712,10 @@ def acceleration(
 
 def advanced(
     model: Model, c: FloatArray, x: FloatArray, torques: FloatArray, step: FloatArray | float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> FloatArray:
     """Angles and velocities (4, N) a `step` s later, by the classical Runge-Kutta method.
 
-    `torques` (3, 2, N) are those at the step's beginning, middle and end. With them come the rates
-    (4, N) at both ends.
+    `torques` (3, 2, N) are those at the step's beginning, middle and end.
     """
 
     def rate(x: FloatArray, tau: FloatArray) -> FloatArray:
@@ -727,7 +726,7 @@ def advanced(
     second = rate(x + 0.5 * step * first, middle)
     third = rate(x + 0.5 * step * second, middle)
     last = rate(x + step * third, end)
-    return x + step / 6 * (first + 2 * (second + third) + last), first, last
+    return x + step / 6 * (first + 2 * (second + third) + last)
 
 
 def _solved(matrix: Sequence[FloatArray | float], right: FloatArray) -> FloatArray:

@@ -30,6 +30,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +55,9 @@ from algid.signals.segments import Segment
 
 _ROUNDS = 4
 _STRIDE = 2  # windows overlap four-fold: more add little, and each is simulated
-_STEP = 4e-3  # s: of the simulation, in which motions of 10 Hz turn by a quarter of a radian
+_STEP = (
+    4e-3  # s: of the simulation at most, in which motions of 10 Hz turn by a quarter of a radian
+)
 _ASTRAY = 100.0  # rad: a simulated window that ends so far from the measured one has run away
 _FEWEST = 0.5  # share of the windows that must not go astray
 _TOGETHER = 8 * (weak.PIECE_SAMPLES + 4096)  # samples whose windows are simulated side by side
@@ -175,7 +178,9 @@ def _batches(sources: Sequence[Source], settings: WeakSettings) -> Iterator[list
         for piece, windows, _ in weak.overlapping(source(), settings):
             if (len(piece) - 2 * windows.margin) // windows.step < OVERLAP:
                 continue
-            if batch and (samples + len(piece) > _TOGETHER or not _alike(windows, batch[0][2])):
+            if batch and (
+                samples + len(piece) > _TOGETHER or _steps(windows) != _steps(batch[0][2])
+            ):
                 yield batch
                 batch, samples = [], 0
             batch.append((number, piece, windows))
@@ -184,14 +189,9 @@ def _batches(sources: Sequence[Source], settings: WeakSettings) -> Iterator[list
         yield batch
 
 
-def _alike(one: Windows, other: Windows) -> bool:
-    """Whether windows have the same samples and steps, whatever the sampling period."""
-    return (one.step, _stride(one.dt)) == (other.step, _stride(other.dt))
-
-
-def _stride(dt: float) -> int:
-    """Samples that a step of the simulation spans: every window is a multiple of it."""
-    return int(np.clip(2 ** np.floor(np.log2(max(_STEP / dt, 1.0))), 2, OVERLAP))
+def _steps(windows: Windows) -> int:
+    """Steps of the simulation in a window: as many in each part that windows overlap by."""
+    return OVERLAP * ceil(windows.step * windows.dt / _STEP)
 
 
 _Motion = tuple[Windows, Segment, int, NDArray[np.bool_]]
@@ -201,21 +201,16 @@ _Motion = tuple[Windows, Segment, int, NDArray[np.bool_]]
 def _driven(batch: Sequence[_Piece], model: Model, c: FloatArray) -> Iterator[_Motion]:
     """What the torque and `c` (q,) make of each piece's windows, one window after the other."""
     cuts = [cut(piece, windows) for _, piece, windows in batch]
-    dt = [
-        np.full(own[0].shape[1], windows.dt)
-        for own, (_, _, windows) in zip(cuts, batch, strict=True)
-    ]
-    theta, omega, tau, measured = (
-        np.concatenate(parts, axis=1) for parts in zip(*cuts, strict=True)
-    )
-    start = np.concatenate([theta, omega])
-    states, good = simulated(model, c, np.concatenate(dt), start, tau, measured)
-    last = 0
-    for (_, _, windows), periods in zip(batch, dt, strict=True):
-        own = slice(last, last := last + periods.size)
-        ends = [rows[:, own].reshape(2, -1) for rows in (states[:2], tau[:, :, :-1], states[2:])]
-        motion = Segment(0.0, windows.dt, ends[0], ends[1], ends[2])
-        yield Windows(windows.dt, windows.length, 0.0, None), motion, OVERLAP, good[own]
+    start, acts, measured = (np.concatenate(parts, axis=-1) for parts in zip(*cuts, strict=True))
+    steps, counts = len(measured), [own[0].shape[1] for own in cuts]
+    periods = [OVERLAP * windows.step * windows.dt / steps for _, _, windows in batch]
+    states, good = simulated(model, c, np.repeat(periods, counts), start, acts, measured)
+    signals = np.concatenate([states, acts[:-1:2]], axis=1)
+    for h, last, count in zip(periods, np.cumsum(counts).tolist(), counts, strict=True):
+        own = slice(last - count, last)
+        rows = np.moveaxis(signals[..., own], 0, -1).reshape(6, -1)  # window by window
+        motion = Segment(0.0, h, rows[:2], rows[4:], rows[2:4])
+        yield Windows(h, steps * h, 0.0, None), motion, OVERLAP, good[own]
 
 
 def _explained(following: Following, batch: Sequence[_Piece]) -> Iterator[_Motion]:
@@ -227,82 +222,62 @@ def _explained(following: Following, batch: Sequence[_Piece]) -> Iterator[_Motio
         yield windows, motion or piece, _STRIDE, good
 
 
-def cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Every `_STRIDE`-th window of a piece: R windows of L samples.
+def cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Every `_STRIDE`-th window of a piece: R windows, each of K steps.
 
     Returns
     -------
-    Angles and velocities (2, R) at their starts, torques (2, R, L + 1) and angles (2, R, L)
+    Angles and velocities (4, R) at their starts, torques (2 K + 1, 2, R) at each half step, and
+    angles (K, 2, R) at the sample nearest to each step
     """
-    length, margin = OVERLAP * windows.step, windows.margin
+    length, margin, steps = OVERLAP * windows.step, windows.margin, _steps(windows)
     starts = margin + np.arange(
         0, len(piece) - 2 * margin - length + 1, windows.step * _STRIDE, dtype=np.int64
     )
-    instants = starts[:, None] + np.arange(length + 1)
-    at = np.clip(instants - windows.shift / windows.dt, 0, len(piece) - 1)
-    before = np.minimum(at.astype(np.int64), len(piece) - 2)
-    tau = piece.tau[:, before] + (at - before) * (piece.tau[:, before + 1] - piece.tau[:, before])
-    measured = piece.theta[:, instants[:, :-1]]
+    instants = starts + length / (2 * steps) * np.arange(2 * steps + 1)[:, None]
+    late, samples = windows.shift / windows.dt, np.arange(len(piece))
+    acts = np.stack([np.interp(instants - late, samples, tau) for tau in piece.tau], axis=1)
+    measured = piece.theta[:, np.rint(instants[:-1:2]).astype(np.int64)].swapaxes(0, 1)
     if windows.bandwidth is None:
         assert piece.omega is not None  # `Windows.equations` has asked for it
-        return piece.theta[:, starts], piece.omega[:, starts], tau, measured
+        return np.concatenate([piece.theta, piece.omega])[:, starts], acts, measured
     reach = half_length(piece.dt, windows.bandwidth)
-    theta, omega = (
+    start = [
         correlate(piece.theta, kernel(piece.dt, windows.bandwidth))[:, starts - reach]
         for kernel in (smoother, differentiator)
-    )
-    return theta, omega, tau, measured
+    ]
+    return np.concatenate(start), acts, measured
 
 
 def simulated(
     model: Model,
     c: FloatArray,
-    dt: FloatArray,
+    h: FloatArray,
     start: FloatArray,
-    tau: FloatArray,
+    acts: FloatArray,
     measured: FloatArray,
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """The motion that windows cut from logs would have had, of samples `dt` (R,) s apart.
+    """The motion that windows cut from logs would have had, in steps of `h` (R,) s.
 
-    Runge-Kutta's fourth order in steps of some `_STEP` s, all windows side by side, from the
-    measured `start` (4, R). (To start earlier, so that what the unmodelled torque did before has
-    faded, made the instruments too weak.)
+    All windows side by side, from the measured `start` (4, R) under the torques that `acts` holds.
+    (To start earlier, so that what the unmodelled torque did before has faded, made the instruments
+    too weak.)
 
     Returns
     -------
-    Angles and velocities (4, R, L), and the windows (R,) that have not gone astray: their mass
-    matrix is positive definite all along, and they end near the measured ones
+    Angles and velocities (K, 4, R), and the windows (R,) that have not gone astray: their mass
+    matrix is positive definite, and they are near the `measured` angles, all along
     """
-    stride = _stride(float(dt[0]))
-    h = stride * dt
-    inside = np.arange(stride) / stride
-    # the torque where the method asks for it
-    acts = np.ascontiguousarray(np.moveaxis(tau[:, :, :: stride // 2], 2, 0))
-    x = start
-    parts = []  # a step each: states at both ends, and their rates
-    with np.errstate(
-        divide="ignore", invalid="ignore", over="ignore"
-    ):  # what moves no arm is judged afterwards
-        for step in range(0, 2 * (measured.shape[2] // stride), 2):
-            ahead, first, last = advanced(model, c, x, acts[step : step + 3], h)
-            # of the angles, the velocity at the end is nearer than the method's last rate
-            last = np.concatenate([ahead[2:], last[2:]])
-            parts.append((x, ahead, h * first, h * last))
-            x = np.clip(ahead, -1e6, 1e6)
-    states = _cubic(np.moveaxis(np.array(parts), 0, -1), inside)
-    (m11, m12), (_, m22) = inertia(model, c, states[:2, :, ::stride])
-    good = np.all((m11 > 0) & (m11 * m22 > m12**2), axis=-1)
-    good &= np.abs(states[:2] - measured).max(axis=(0, 2)) < _ASTRAY
+    states = np.empty((len(measured), *start.shape))
+    # what moves no arm is judged afterwards
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for step, state in enumerate(states):
+            state[:] = start
+            ahead = advanced(model, c, start, acts[2 * step : 2 * step + 3], h)
+            start = np.clip(ahead, -1e6, 1e6)
+    (m11, m12), (_, m22) = inertia(model, c, states[:, :2].swapaxes(0, 1))
+    good = np.all((m11 > 0) & (m11 * m22 > m12**2), axis=0)
+    good &= np.abs(states[:, :2] - measured).max(axis=(0, 1)) < _ASTRAY
     # A window that went astray is left out; products of its velocities would overflow.
-    states[:, ~good] = 0.0
+    states[..., ~good] = 0.0
     return states, good
-
-
-def _cubic(parts: FloatArray, s: FloatArray) -> FloatArray:
-    """Cubic Hermite (4, R, K S) at shares `s` (S,) of K steps.
-
-    `parts` (4, 4, R, K) are what the steps begin and end at, and how much both ends rise a step.
-    """
-    rise_of_end = s**2 * (3 - 2 * s)
-    weights = np.stack([1 - rise_of_end, rise_of_end, s * (1 - s) ** 2, s**2 * (s - 1)])
-    return np.einsum("wark,ws->arks", parts, weights).reshape(*parts.shape[1:3], -1)

@@ -142,15 +142,11 @@ def _starts(
     late = shift.at(dt) - model.lag(c)
     when = at * dt + 0.5 * step * np.arange(halves)[:, None] - late
     t = np.arange(n) * dt
-    width = max(1, round(step / dt))
-    ends, box = (width // 2, (width - 1) // 2), np.full(width, 1 / width)
-    offset = 0.5 * dt * (1 - width % 2)  # of the mean over an even number of samples
     u = np.empty((halves, 2, at.size))
     ahead = at + np.array(HORIZONS)[:, None] / dt
     y = np.empty((len(HORIZONS), 2, at.size))
     for joint in range(2):
-        tau = np.convolve(np.pad(piece.tau[joint], ends, "edge"), box, "valid")
-        u[:, joint] = np.interp(when + offset, t, tau)
+        u[:, joint] = np.interp(when, t, piece.tau[joint])
         y[:, joint] = np.interp(ahead, np.arange(n), motion.theta[joint])
     y[np.broadcast_to((ahead > n - 1 - edge)[:, None], y.shape)] = np.nan
     return np.concatenate([motion.theta[:, at], motion.omega[:, at]]), u, y
@@ -165,7 +161,7 @@ def _angles_at_horizons(
     # an arm far from the log's may run away: its error is infinite then
     with np.errstate(all="ignore"):
         for number in range(ends[-1]):
-            x, _, _ = advanced(model, c, x, u[2 * number : 2 * number + 3], step)
+            x = advanced(model, c, x, u[2 * number : 2 * number + 3], step)
             if number + 1 in ends:
                 angles.append(x[:2])
     return angles

@@ -81,11 +81,11 @@ def test_the_estimate_is_that_of_two_stages_of_least_squares() -> None:
 def test_coefficients_that_move_no_arm_and_windows_that_run_away_are_told(bench: Bench) -> None:
     k, log = bench.arm.constants(), bench.log()
     windows = Windows(log.dt, 0.2, 0.0, None)
-    theta, omega, tau, measured = instruments.cut(log, windows)
-    every, start = np.full(theta.shape[1], log.dt), np.concatenate([theta, omega])
+    start, acts, measured = instruments.cut(log, windows)
+    every = np.full(start.shape[1], 0.2 / len(measured))
     wild = k * np.array([1, 1, 1, 1, 1, -500, -500])
     for astray_at in (-k, wild):
-        _, good = instruments.simulated(Model(), astray_at, every, start, tau, measured)
+        _, good = instruments.simulated(Model(), astray_at, every, start, acts, measured)
         assert not good.any()
     least = weak.fit(problem_of(log))
     for astray_at in (-k, wild):
