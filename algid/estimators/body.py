@@ -43,9 +43,11 @@ def with_body(fit: Fit) -> Fit:
     names, worth = _candidates(fit)
     every = [with_body_of(fit, body) for body in _bodies(names)]
     worthy = [one for one in every if min(_worths(one)) > worth]
-    if worthy:
-        return max(worthy, key=lambda one: (len(one.shared.body), _likelihood(one)))
-    return with_body_of(fit, ())
+
+    def rank(one: Fit) -> tuple[int, float]:
+        return len(one.shared.body), likelihood(one.shared, one.logs, one.values, one.prior)[0]
+
+    return max(worthy, key=rank, default=with_body_of(fit, ()))
 
 
 def _bodies(names: Sequence[str]) -> Iterator[tuple[str, ...]]:
@@ -98,10 +100,7 @@ def _weight(fit: Fit, more: Sequence[str]) -> float:
     """exp(W / 2 - n) of the parameters `more`; 0 of what no object has, or the logs leave open."""
     if not fit.converged or not all(_worths(fit)):
         return 0.0
-    places = list(map(fit.names.index, more))
-    value, C = fit.values[places], fit.covariance[np.ix_(places, places)]
-    wald = float(value @ np.linalg.solve(C, value))
-    return float(np.exp(min(0.5 * wald, _MOST) - len(more)))
+    return float(np.exp(min(0.5 * fit.wald(more), _MOST) - len(more)))
 
 
 def _candidates(fit: Fit) -> tuple[list[str], float]:
@@ -151,19 +150,8 @@ def _worths(fit: Fit) -> list[float]:
 
     An inertia is positive, and its radius of gyration no longer than joint 2 is away.
     """
-    worths = []
     m_p, _, r, J = fit.shared.physical(fit.values)
     if J < 0 or m_p * abs(r) ** 2 < J:
         return [0.0]
-    for name in fit.shared.body:
-        place = fit.names.index(name)
-        value, std = float(fit.values[place]), float(fit.std[place])
-        worth = 0.0
-        if std > 0 and np.isfinite(std):
-            worth = (value / std) ** 2
-        worths.append(worth)
-    return worths
-
-
-def _likelihood(fit: Fit) -> float:
-    return likelihood(fit.shared, fit.logs, fit.values, fit.prior)[0]
+    std = dict(zip(fit.names, fit.std.tolist(), strict=True))
+    return [fit.wald((name,)) if np.isfinite(std[name]) else 0.0 for name in fit.shared.body]

@@ -246,11 +246,17 @@ class Scatter:
     each: FloatArray
     stretches: int
 
-    @property
-    def among(self) -> FloatArray:
-        """Variance (Q, Q) of the sum of the logs' scores, by how two logs or more differ."""
+    def among(self, logs: float = 0.0) -> FloatArray:
+        """Variance (Q, Q) of the sum of the logs' scores, by how n of them differ.
+
+        It is w n / (n - 1) Σ s sᵀ + (1 - w) S, w = (n - 1) / (n - 1 + `logs`): the scatter of few
+        scores s is drawn to the information, as if that were so many logs.
+        """
         n = len(self.each)
-        return np.asarray(n / (n - 1) * self.each.T @ self.each)
+        weight = (n - 1) / (n - 1 + logs)
+        return np.asarray(
+            weight * n / max(1, n - 1) * self.each.T @ self.each + (1 - weight) * self.S
+        )
 
 
 def scatters(shared: Shared, logs: Sequence[LogInformation], beta: FloatArray) -> list[Scatter]:

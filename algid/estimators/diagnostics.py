@@ -280,7 +280,7 @@ def ratio_of_joints(normals: Sequence[Normal], model: Model, unlike: float) -> f
     """
     shared = Shared(model)
     for normal in normals:
-        if not normal.gram[:, :, -1, -1].any(axis=0).all():
+        if not normal.power.all():
             return None  # without a motor a joint's equation is solved by nothing
     both = np.flatnonzero(np.isin(model.names, (K1, K2, K3)))
 
@@ -314,24 +314,15 @@ def term_worths(fit: Fit) -> Iterator[tuple[str, float]]:
     It is the BIC with the term less that without it: negative if the term earns its place.
     """
     for term in OPTIONAL:
-        places = list(map(fit.names.index, within(term.names, fit.names)))
-        if places:
-            values = fit.values[places]
-            wald = float(values @ scaled_pinv(fit.covariance[np.ix_(places, places)]) @ values)
-            yield term.name, len(places) * float(np.log(max(2, fit.freedom))) - wald
+        own = within(term.names, fit.names)
+        if own:
+            yield term.name, len(own) * float(np.log(max(2, fit.freedom))) - fit.wald(own)
 
 
 def bent(fit: Fit) -> bool:
     """Whether the moments' sine parts are together more than chance makes one time in twenty."""
-    places = list(map(fit.names.index, within(SINES, fit.names)))
-    known = [place for place in places if fit.covariance[place, place] > 0]
-    if not known:
-        return False
-    s, C = fit.values[known], fit.covariance[np.ix_(known, known)]
-    scale = np.sqrt(np.diag(C))
-    correlation = C / np.outer(scale, scale)
-    distance = (s / scale) @ np.linalg.pinv(correlation, hermitian=True) @ (s / scale)
-    return float(chi2_tail(len(known), float(distance))) < 0.05
+    own = within(SINES, fit.names)
+    return bool(own) and float(chi2_tail(len(own), fit.wald(own))) < 0.05
 
 
 def payload_distance(fit: Fit) -> float | None:

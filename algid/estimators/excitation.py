@@ -112,7 +112,7 @@ def _hardly_driven(normals: Sequence[Normal]) -> int | None:
 
     One without a torque has no motor: see `undriven`.
     """
-    torques = np.max([normal.gram[:, :, -1, -1].sum(axis=0) / normal.rows for normal in normals], 0)
+    torques = np.max([normal.power / normal.rows for normal in normals], axis=0)
     for joint in range(2):
         if 0 < torques[joint] < MOTORLESS**2 * torques[1 - joint]:
             return joint + 1

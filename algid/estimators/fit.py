@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -11,13 +11,12 @@ import numpy as np
 
 from algid.arm import FloatArray, keep_arrays, read_only
 from algid.base.compiled import student_quantile
-from algid.base.names import outside, places_outside, vector
+from algid.base.names import vector
 from algid.base.significance import NORMAL, level
 from algid.estimators.combine import (
     FEWEST_LOGS,
     LogInformation,
     Prior,
-    Scatter,
     combine,
     jackknife,
     left_out,
@@ -27,7 +26,6 @@ from algid.estimators.combine import (
     scatters,
 )
 from algid.estimators.identifiability import (
-    Identifiability,
     examine,
     open_directions,
 )
@@ -191,6 +189,12 @@ class Fit:
         """The fit with one more thing to say of it."""
         return replace(self, notes=self.notes + (note,))
 
+    def wald(self, names: Iterable[str]) -> float:
+        """Wald statistic of the parameters `names`: their squares in their covariance's units."""
+        places = list(map(self.names.index, names))
+        values, C = self.values[places], self.covariance[np.ix_(places, places)]
+        return float(values @ scaled_pinv(C) @ values)
+
     def spread(self, share: FloatArray) -> float:
         """Standard deviation of the sum `share` (Q,) @ values.
 
@@ -266,7 +270,7 @@ def finish(
         bounded = prior.absent
     if shrinkage is not None:
         bounded += shrinkage.names
-    known = examined(shared.names, beta, S, moved, bounded)
+    known = examine(shared.names, beta, S, moved, bounded)
     covariance, quantile, freedom = known.covariance, NORMAL, samples
     intervals: Intervals = "likelihood"
     if coloured:
@@ -280,7 +284,7 @@ def finish(
         kinds, known_before = scatters(shared, each, beta), precision_of(prior, shared)
         meat, freedom = sandwich(kinds)
         if shrinkage is not None:
-            meats = [_among(kinds), meat]
+            meats = [np.sum([kind.among(_PRIOR_LOGS) for kind in kinds], axis=0), meat]
             inverse = scaled_pinv(S)
             ways = [inverse @ (one + known_before) @ inverse for one in meats]
             if repeated is not None:
@@ -351,42 +355,6 @@ OF_FEW = 2.3
 """Half width of a 95 % interval in standard deviations beside shrunk terms: `make run-to-run`."""
 _PRIOR_LOGS = 4.0
 """Logs that the information counts as, beside the scatter of few logs: `make run-to-run`."""
-
-
-def _among(kinds: Sequence[Scatter]) -> FloatArray:
-    """Variance (Q, Q) of the sum of all logs' scores, by how they differ.
-
-    That of n logs of a kind is w n / (n - 1) Σ s sᵀ + (1 - w) S, w = (n - 1) / (n - 1 +
-    `_PRIOR_LOGS`): the scatter of few scores s is drawn to the information.
-    """
-    meat = np.zeros_like(kinds[0].S)
-    for kind in kinds:
-        n = len(kind.each)
-        weight = (n - 1) / (n - 1 + _PRIOR_LOGS)
-        meat += (1 - weight) * kind.S
-        if n > 1:
-            meat += weight * kind.among
-    return meat
-
-
-def examined(
-    names: Sequence[str],
-    beta: FloatArray,
-    S: FloatArray,
-    moved: FloatArray,
-    bounded: Collection[str],
-) -> Identifiability:
-    """What logs determine beside parameters that are `bounded`: known to be nothing, or shrunk."""
-    if not bounded:
-        return examine(names, beta, S, moved)
-    free = places_outside(names, bounded)
-    marginal = scaled_pinv(scaled_pinv(S)[np.ix_(free, free)])
-    of_free = examine(outside(names, bounded), beta[free], marginal, moved)
-    covariance = np.zeros_like(S)
-    covariance[np.ix_(free, free)] = of_free.covariance
-    determined = np.ones(len(names), dtype=bool)
-    determined[free] = of_free.determined
-    return Identifiability(of_free.left_open, tuple(determined.tolist()), covariance)
 
 
 def _satterthwaite(

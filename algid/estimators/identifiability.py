@@ -15,7 +15,7 @@ null    directions over the sizes that S leaves open         (Q, m)           1
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.base.criteria import STILL, UNDETERMINED
+from algid.base.names import outside, places_outside
+from algid.estimators.combine import scaled_pinv
 from algid.model import PARAMETERS, RIGID
 from algid.notices import Notice
 from algid.physics.parameters import INERTIA, LENGTH, MASS, MOMENT, VISCOUS
@@ -45,7 +47,11 @@ class Identifiability:
 
 
 def examine(
-    names: Sequence[str], values: FloatArray, S: FloatArray, moved: FloatArray
+    names: Sequence[str],
+    values: FloatArray,
+    S: FloatArray,
+    moved: FloatArray,
+    bounded: Collection[str] = (),
 ) -> Identifiability:
     """Which parameters and combinations the information determines.
 
@@ -57,6 +63,8 @@ def examine(
         Information on them.
     moved : (2,), rad
         Each joint's travel: why something is open.
+    bounded : names that are known to be nothing, or shrunk
+        They are determined, and the others' information is what they leave of it.
 
     Returns
     -------
@@ -64,6 +72,13 @@ def examine(
         A parameter is open that has a share of `SHARE` or more in an open direction. The
         covariance is the inverse of S, as wide along open directions as S has it.
     """
+    free = places_outside(names, bounded)
+    if len(free) < len(names):
+        marginal = scaled_pinv(scaled_pinv(S)[np.ix_(free, free)])
+        of_free = examine(outside(names, bounded), values[free], marginal, moved)
+        covariance, known = np.zeros_like(S), np.ones(len(names), dtype=bool)
+        covariance[np.ix_(free, free)], known[free] = of_free.covariance, of_free.determined
+        return Identifiability(of_free.left_open, tuple(known.tolist()), covariance)
     size = sizes(names, values)
     eigenvalues, vectors, lost = _spectrum(S, size)
     null = vectors[:, lost]

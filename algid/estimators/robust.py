@@ -55,6 +55,7 @@ from numpy.typing import NDArray
 from algid.arm import FloatArray, keep_arrays
 from algid.base.compiled import chi2_tail
 from algid.base.criteria import AT_REST
+from algid.base.names import outside, within
 from algid.base.significance import chance, level
 from algid.estimators import instruments, weak
 from algid.estimators.combine import (
@@ -365,7 +366,7 @@ def offered(normals: Sequence[Normal], held: Sequence[str] = ()) -> tuple[str, .
 
     Elastic joints are those of a first pass alone, which `held` tells.
     """
-    driven = all(normal.gram[:, :, -1, -1].any(axis=0).all() for normal in normals)
+    driven = all(normal.power.all() for normal in normals)
     terms = []
     for name, term in TERMS.items():
         free = term.spread is not None and not term.elastic and (driven or not term.gains)
@@ -385,10 +386,7 @@ def _driven(normals: Sequence[Normal]) -> list[NDArray[np.bool_]]:
     constants near nothing: the better, the more it would weigh. An arm without its payload may need
     a fifth of the torque and is driven nevertheless.
     """
-    torques: list[FloatArray] = []
-    for normal in normals:
-        squares = normal.gram[:, :, -1, -1].sum(axis=0)
-        torques.append(np.sqrt(squares / np.maximum(normal.rows, 1)))
+    torques = [np.sqrt(normal.power / np.maximum(normal.rows, 1)) for normal in normals]
     most = np.max(torques, axis=0, initial=0.0)
     return [(torque >= _HARDLY * most) for torque in torques]
 
@@ -402,27 +400,18 @@ def expectation(
 ) -> Expected:
     """Prior of the terms of logs whose torque has the size of `normals`, but of what is `known`."""
     held = () if known is None else known.names
-    squares, rows = np.zeros(2), np.zeros(2)
-    for normal in normals:
-        squares += normal.gram[:, :, -1, -1].sum(axis=0)
-        rows += normal.rows
-    torque = np.sqrt(squares / np.maximum(rows, 1.0))
+    rows = np.sum([normal.rows for normal in normals], axis=0)
+    torque = np.sqrt(np.sum([normal.power for normal in normals], axis=0) / np.maximum(rows, 1.0))
     # a joint without a motor carries a load like the other's
     torque = np.where(torque > 0, torque, torque.max())
     value = dict(zip(shared.names, np.abs(beta).tolist(), strict=True))
-    names, terms, means, spreads, usual = [], [], [], [], []
-    offered_terms = shared.model.terms
-    if shared.delay:
-        offered_terms += DELAYS
-    for term in offered_terms:
-        spread = EVERY_TERM[term].spread
-        if spread is None:
-            continue
-        mean = 0.0
+    found = []
+    for term in shared.model.terms + (DELAYS if shared.delay else ()):
+        spread, mean = EVERY_TERM[term].spread, 0.0
         if term in DELAYS and not settings.shift.held:
             mean = 0.5 * normals[0].dt  # of a torque that a digital controller holds
-        for name in EVERY_TERM[term].names:
-            if name in held or name not in shared.names:
+        for name in outside(within(EVERY_TERM[term].names, shared.names), held):
+            if spread is None:
                 continue
             unit = 1.0
             if spread.of == "inertia":
@@ -433,12 +422,9 @@ def expectation(
                 unit = float(torque[int(name.endswith("2"))])
             elif spread.of == "cosine":
                 unit = value[SINES[name]]
-            names.append(name)
-            terms.append(term)
-            means.append(mean)
-            spreads.append(spread.size * unit)
-            usual.append(spread.usual)
-    return Expected(tuple(names), tuple(terms), np.array(means), np.array(spreads), np.array(usual))
+            found.append((name, term, mean, spread.size * unit, spread.usual))
+    names, terms, *numbers = zip(*found, strict=True) if found else [()] * 5
+    return Expected(names, terms, *map(np.array, numbers))
 
 
 def dispersion(shared: Shared, logs: Sequence[LogInformation], beta: FloatArray) -> float:
@@ -454,7 +440,7 @@ def dispersion(shared: Shared, logs: Sequence[LogInformation], beta: FloatArray)
     ratios = [1.0]
     for some, meats in (
         (kinds, [kind.within for kind in kinds]),
-        (many, [kind.among for kind in many]),
+        (many, [kind.among() for kind in many]),
     ):
         if some:
             S = np.sum([kind.S for kind in some], axis=0)

@@ -13,7 +13,8 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.estimators.combine import LogInformation, combine
-from algid.estimators.fit import Fit, examined
+from algid.estimators.fit import Fit
+from algid.estimators.identifiability import examine
 
 _NEAR = 0.5
 """Standard deviations from the largest likelihood within which a running estimate is drawn."""
@@ -73,7 +74,7 @@ def _estimate(fit: Fit, logs: Sequence[LogInformation]) -> tuple[FloatArray, Flo
     beta, S, _ = combine(fit.shared, logs, fit.values, fit.prior)
     if not S.any():  # a joint at rest, and nothing else so far
         return np.full(beta.shape, np.nan), np.full(beta.shape, np.nan)
-    known = examined(fit.names, beta, S, fit.moved, fit.absent)
+    known = examine(fit.names, beta, S, fit.moved, fit.absent)
     std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
     # the fit may know better than its sums
     lost = np.array([status == "NOT_IDENTIFIABLE" for status in fit.status])

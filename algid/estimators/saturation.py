@@ -31,9 +31,9 @@ from numpy.typing import NDArray
 from algid.arm import FloatArray
 from algid.base.quantiles import median
 from algid.estimators.combine import long_run_variance, scaled_pinv
-from algid.estimators.modulating_functions import OVERLAP
+from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.estimators.problem import WeakSettings
-from algid.estimators.weak import Normal, grams, overlapping, solve
+from algid.estimators.weak import Normal, normal_equations, solve
 from algid.model import FIRST_TERMS, Model
 from algid.signals.segments import Segment, settled
 
@@ -129,21 +129,17 @@ def _normal(pieces: Sequence[Segment], model: Model, levels: Sequence[Limit]) ->
 
     None where no piece is as long as a window.
     """
-    settings = WeakSettings(model=model)
-    parts, rows = [], 0
-    for piece, windows, _ in overlapping(pieces, settings):
-        X = windows.equations(settings.model, piece, True)
-        if not X.shape[2]:
-            continue
-        H = np.zeros((2, 2 * len(levels), X.shape[2]))
-        for number, one in enumerate(levels):
-            h = _plateaus(piece.tau[one.joint], piece.dt, one)
-            H[one.joint, 2 * number : 2 * number + 2] = windows.torque_moments(h)
-        parts.append(grams(np.concatenate([X[:, :-1], H, X[:, -1:]], axis=1), OVERLAP))
-        rows += X.shape[2]
-    if not parts:
-        return None
-    return Normal(np.concatenate(parts), pieces[0].dt, 0, np.full(2, rows), np.zeros(2))
+
+    def plateaus(piece: Segment, windows: Windows) -> FloatArray:
+        H = [
+            windows.torque_moments(_plateaus(piece.tau[one.joint], piece.dt, one)) for one in levels
+        ]
+        own = np.equal.outer([0, 1], np.repeat([one.joint for one in levels], 2))
+        return np.where(own[..., None], np.concatenate(H), 0.0)
+
+    return normal_equations(
+        lambda: pieces, WeakSettings(model=model, estimate_delay=True), beside=plateaus
+    )
 
 
 def _judged(

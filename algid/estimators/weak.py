@@ -159,18 +159,25 @@ class Normal:
     rows: FloatArray
     moved: FloatArray
 
+    @property
+    def power(self) -> FloatArray:
+        """Squares of each joint's torque, summed (2,)."""
+        return np.asarray(self.gram[:, :, -1, -1].sum(axis=0))
+
 
 def normal_equations(
     source: Source,
     settings: WeakSettings,
     at: FloatArray | None = None,
     known: dict[Hashable, Known] | None = None,
+    beside: Callable[[Segment, Windows], FloatArray] | None = None,
 ) -> Normal | None:
     """Normal equations of one log; None where it is too short for a window.
 
     A log without a stretch of four windows gets windows of a quarter of its longest stretch. Terms
     that are not linear are linearised at the coefficients `at` (q,). Of a log that is looked at
-    with several models, at one hold of the torque, `known` keeps the moments by piece.
+    with several models, at one hold of the torque, `known` keeps the moments by piece. Columns
+    (2, m, R) `beside` those of the model stand before the torque.
     """
 
     def gather(window: float) -> tuple[Normal | None, float]:
@@ -190,6 +197,8 @@ def normal_equations(
             X = windows.equations(settings.model, piece, settings.estimate_delay, at, kept)
             if not X.shape[2]:
                 continue
+            if beside is not None:
+                X = np.concatenate([X[:, :-1], beside(piece, windows), X[:, -1:]], axis=1)
             moving = np.ones((2, X.shape[2]), dtype=bool)
             if settings.rest is not None:
                 moving = windows.square_speeds(piece) >= np.square(settings.rest)[:, None]
@@ -231,31 +240,22 @@ def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> Residual
     """
 
     def gather(window: float) -> tuple[list[ResidualSums], float]:
-        gathered: list[ResidualSums] = []
-        rows: list[FloatArray] = []
+        runs: list[list[FloatArray]] = []
         longest = spacing = 0.0
-
-        def add_up() -> None:
-            if _count(rows) >= 2 * OVERLAP:
-                together = np.concatenate(rows, axis=1)
-                gathered.append(residual_sums(together, spacing, OVERLAP, LAGS * OVERLAP // 2))
-            rows.clear()
-
         for piece, windows, own in residual_rows(source, settings, c, window):
-            longest = max(longest, _seconds(piece))
-            if not piece.continues or _count(rows) >= PIECE_SAMPLES:
-                add_up()
-            spacing = windows.step * windows.dt
-            rows.append(own)
-        add_up()
-        return gathered, longest
+            longest, spacing = max(longest, _seconds(piece)), windows.step * windows.dt
+            if not (runs and piece.continues):
+                runs.append([])
+            runs[-1].append(own)
+        whole = [np.concatenate(run, axis=1) for run in runs]
+        lags = LAGS * OVERLAP // 2
+        return [
+            residual_sums(rows, spacing, OVERLAP, lags)
+            for rows in whole
+            if rows.shape[1] >= 2 * OVERLAP
+        ], longest
 
     return pooled(_with_window(gather, settings.window))
-
-
-def _count(rows: Iterable[FloatArray]) -> int:
-    """How many windows the parts (4, R) have together."""
-    return sum(part.shape[1] for part in rows)
 
 
 def _with_window(gather: Callable[[float], tuple[Gathered, float]], window: float) -> Gathered:

@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 import algid
 from algid.base.errors import LogError
 from algid.identification.identify import identify
-from algid.identification.recordings import open_source
+from algid.identification.open_logs import open_source
 from algid.log import Log
 from algid.profile import Profile
 from algid.results import Status, read_result, result_schema
@@ -206,11 +206,21 @@ def test_constrain_obeys_every_bound(change: str, noisy: tuple[Log, Log]) -> Non
 def test_a_log_whose_lost_samples_were_renumbered_has_failed_unless_it_is_accepted() -> None:
     log, _ = algid.synthesise("case1", duration=4.0, torque="wide", sensors=Sensors(1e-4, 1e-3))
     kept = np.random.default_rng(5).random(len(log)) > 0.05
-    lost = Log.from_arrays(log.t[: kept.sum()], log.theta[:, kept], log.tau[:, kept])
+    some = int(kept.sum())
+    lost = replace(
+        log,
+        stamp_ns=log.stamp_ns[:some],
+        theta=log.theta[:, kept],
+        tau=log.tau[:, kept],
+        omega=None,
+    )
     found = algid.identify(lost, report=False, settings=WEAK)
     assert found.verdict.grade == "failed"
     assert not any(one.status is Status.OK for one in found.parameters.values())
-    accepted = algid.identify(lost, report=False, settings=WEAK, accept=("LOST_SAMPLES",))
+    reading = replace(lost.origin.reading, accepted=("LOST_SAMPLES",))
+    accepted = algid.identify(
+        replace(lost, origin=replace(lost.origin, reading=reading)), report=False, settings=WEAK
+    )
     assert any(one.status is Status.OK for one in accepted.parameters.values())
     assert any("LOST_SAMPLES" in warning for warning in accepted.warnings)
 

@@ -6,22 +6,22 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from algid.base.errors import LogError
-from algid.identification.recordings import (
-    Recordings,
+from algid.identification.open_logs import (
     Staged,
     open_source,
     open_sources,
 )
+from algid.identification.recordings import Recording, Recordings
 from algid.log import Log, Origin, Truth
 from algid.synth.cases import load_case
 from algid.writers import write_log
-from tests.identification.fits import in_blocks
 
 ARM = load_case("case1").arm
 
@@ -36,6 +36,12 @@ def moving(
     stamps = 5_000_000_000 + np.arange(samples) * 1_000_000
     came = Origin(name, "csv", {}, truth, **origin)  # type: ignore[arg-type]
     return Log(stamps, theta, 3 * np.cos(theta), came)
+
+
+def in_blocks(log: Log, cuts: list[int], promised: int = 0) -> Recording:
+    ends = [0, *cuts, len(log)]
+    blocks = [log.part(first, last) for first, last in pairwise(ends)]
+    return replace(open_source(log, "unloaded"), blocks=lambda: iter(blocks), promised=promised)
 
 
 @pytest.mark.parametrize(
@@ -114,15 +120,16 @@ def test_twins_count_once_and_others_of_their_length_stay() -> None:
     one, other = moving("one.csv"), moving("other.csv", payload=0.0)
     bent = replace(moving("bent.csv"), tau=one.tau + 1e-12)
     third = moving("third.csv")
-    kept = open_sources([one, bent, other, third], None)
+    kept = open_sources([one, bent, other, third], None, None, 9.81)
     assert [source.name for source in kept] == ["one.csv", "bent.csv"]
     assert [(notice.code, notice.numbers["name"]) for notice in kept[0].notices] == [
         ("SAME_LOG", "other.csv"),
         ("SAME_LOG", "third.csv"),
     ]
     assert kept[1].notices == ()
-    assert open_sources(None, None) == []
-    assert [source.name for source in open_sources(iter([one]), None)] == ["one.csv"]
+    assert open_sources(None, None, None, 9.81) == []
+    assert [source.name for source in open_sources(iter([one]), None, None, 1.6)] == ["one.csv"]
+    assert open_sources(one, None, None, 1.6)[0].gravity == 1.6
 
 
 @pytest.mark.parametrize(("cuts", "alone"), [([], True), ([599], False), ([300], False)])

@@ -19,7 +19,8 @@ from algid.estimators.combine import LogInformation
 from algid.estimators.innovations import residual_sums
 from algid.estimators.prediction import score
 from algid.identification.by_likelihood import Fitted
-from algid.identification.recordings import Recordings, open_source
+from algid.identification.open_logs import open_source
+from algid.identification.recordings import Recordings
 from algid.identification.series import (
     START_KEY,
     Predictor,
