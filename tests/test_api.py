@@ -74,8 +74,6 @@ def test_a_result_is_read_by_a_string_and_shows_itself_as_a_short_table(tmp_path
     hostile = found.model_copy(
         update={"log": found.log.model_copy(update={"path": "<b>\x1b[31m\n.csv"})}
     )
-    assert "<b>" not in hostile._repr_html_()
-    assert hostile._repr_html_().count("<tr>") == 1 + len(made.estimates)
     assert "\x1b" not in str(hostile)
     assert len(str(hostile).splitlines()) == len(lines)
 
@@ -177,7 +175,7 @@ def test_a_log_is_made_of_arrays_either_way_round_and_gives_the_same_result() ->
     assert frame["parameter"].to_list() == list(one.estimates)
     assert frame["std"][0] == one.parameters["k1"].std
     assert one.covariance.shape == (len(one.fit.covariance_names),) * 2 if one.fit else False
-    assert one.verdict.word in one._repr_html_()
+    assert one.verdict.word in repr(one)
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from algid.api import Answer
-from algid.api.options import opened, verb
+from algid.api.options import opened, stem_of, verb
 from algid.base.errors import SettingError
 from algid.options import Option
 from algid.results import Result
@@ -33,7 +32,7 @@ def compare(
     *results : Result or path of one, one after another, or in a list
         Two results or more.
     labels : str, one each
-        What to call them; by default what tells their folders, or their logs, apart.
+        What to call them; by default the names of their folders, or of their logs.
     out : Path
         Page NAME.html, or the folder to write compare.html into. None writes nothing.
     force : bool
@@ -77,7 +76,7 @@ def compare(
     if labels is not None and len(labels) != len(given):
         raise SettingError(f"labels: expected {len(given)}, found {len(labels)}")
     if labels is None and not any(isinstance(one, Result) for one in given):
-        labels = labels_of(list(map(Path, given)))
+        labels = list(map(stem_of, map(Path, given)))
     comparison = compared(list(map(opened, given)), labels)
     if out is not None:
         write_comparison(comparison, page_of(Path(out)), force)
@@ -97,10 +96,3 @@ def answer(found: Comparison, given: Mapping[str, Any]) -> Answer:
     """The tables."""
     remarks = [f"wrote {page_of(Path(given['out']))}"] if "out" in given else []
     return Answer(found.tables(), found.as_json, remarks)
-
-
-def labels_of(paths: Sequence[Path]) -> list[str]:
-    """The folders' names without the suffix, below what they share."""
-    folders = [one.parent if one.name == "result.json" else one for one in map(Path.resolve, paths)]
-    shared = os.path.commonpath([folder.parent for folder in folders])
-    return [str(folder.relative_to(shared)).removesuffix(".algid") for folder in folders]

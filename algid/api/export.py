@@ -20,6 +20,7 @@ from algid.api.options import (
     called,
     folder_or_none,
     opened,
+    stem_of,
     verb,
 )
 from algid.base.errors import SettingError
@@ -162,7 +163,7 @@ def file_of(result: Path, to: str, draws: int | None = None) -> str:
     """
     from algid.exports.formats import SUFFIXES
 
-    stem = (result.resolve().parent if result.name == "result.json" else result).stem or "arm"
+    stem = stem_of(result)
     if draws is not None:
         return f"{stem}-draws"
     if to == "payload":

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from algid.api import Answer
-from algid.api.options import AnyLog, LogOptions, ProfileLike, meant, verb
+from algid.api.options import AnyLog, LogOptions, ProfileLike, meant, options_of, verb
 from algid.base.errors import Exit, SettingError, exit_of
 from algid.base.files import refuse_existing, whole_file
-from algid.base.text import lines_of
+from algid.base.text import as_toml, lines_of, visible
 from algid.options import flag
 
 if TYPE_CHECKING:
@@ -83,11 +83,39 @@ def inspect(
         refuse_existing(file, force)
     found = inspect_log(log, own)
     if file is not None:
-        from algid.inspection.draft import draft_profile
-
         with whole_file(file, force=force) as temporary:
             temporary.write_text(draft_profile(found), encoding="utf-8")
     return found
+
+
+def draft_profile(found: Inspection) -> str:
+    """The text of a profile to edit: every key there is, filled in as far as a log states it.
+
+    For a log that cannot be read yet, its names stand in comments.
+    """
+    from algid.exports import template
+    from algid.profile import Profile
+    from algid.readers.table import CHANNELS
+
+    reading, mapping, options = found.reading, found.mapping or {}, options_of(Profile)
+    main, *_ = *reading.topics, ""
+    time = mapping.get("t", "") if mapping.get("t") in [one.name for one in found.entries] else ""
+    channels = {}
+    for name in CHANNELS:
+        source = mapping.get(name, "")
+        topic = next((one for one in reading.topics if source.startswith(f"{one}: ")), "")
+        source = source.removeprefix(f"{topic}: ")
+        channels[name] = "" if topic == main else topic, source
+    known = {"topic": main, "joints": reading.joints, "time": time, "time_unit": reading.time_unit}
+    text = template(Path(__file__).parents[1] / "inspection/algid.toml.j2").render(
+        found=found,
+        known=known,
+        channels=channels,
+        units={name: options[f"{name}.unit"].words for name in CHANNELS},
+        toml=as_toml,
+        visible=visible,
+    )
+    return str(text).lstrip()
 
 
 def profile_file(place: str | Path) -> Path:

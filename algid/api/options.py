@@ -350,6 +350,11 @@ def called(given: Result | str | Path) -> str:
     return str(given) if isinstance(given, str | Path) else given.log.path
 
 
+def stem_of(result: Path) -> str:
+    """The name of a result's folder less its suffix, given by that or by its result.json."""
+    return (result.resolve().parent if result.name == "result.json" else result.resolve()).stem
+
+
 def folder_or_none(folder: Path | None, force: bool) -> AbstractContextManager[Path | None]:
     """A folder to write into, whole or not at all; None where nothing is to be written."""
     return nullcontext() if folder is None else whole_folder(folder, force)

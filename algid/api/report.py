@@ -72,7 +72,7 @@ def report(
             from algid.fleet.page import write_history
 
             history = history_of(folder / "jobs.parquet", progress)
-            document, written = write_history(history, Path(out or folder), folder)
+            document, written = write_history(history, Path(out or folder))
             shown: Iterable[Document] = [document]
             as_json = history.as_json
         elif out is not None:

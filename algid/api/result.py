@@ -101,12 +101,6 @@ class Result(results.Result):  # noqa: D101
 
     __repr__ = __str__
 
-    def _repr_html_(self) -> str:
-        """For notebooks."""
-        from algid.report.render import notebook
-
-        return notebook(self, self.subject)
-
 
 def read_result(path: str | Path) -> Result:
     """Read a result.

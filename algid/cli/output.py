@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import os
-import pathlib
+import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,6 +20,10 @@ from algid.base.text import printable
 
 if TYPE_CHECKING:
     from algid.api import Answer
+
+
+CLEAR = "\r\x1b[2K"
+"""Has a terminal begin its line anew."""
 
 
 def say(text: str) -> None:
@@ -38,9 +42,9 @@ def complain(text: str) -> None:
 
 
 def clear_line() -> None:
-    """Give the terminal back a blank line and its cursor, after a process that was showing one."""
+    """Give the terminal back a blank line, after a process that was showing one."""
     if sys.stderr.isatty():
-        print("\r\x1b[2K\x1b[?25h", end="", file=sys.stderr, flush=True)
+        print(CLEAR, end="", file=sys.stderr, flush=True)
 
 
 def shown(answer: Answer, json: bool, quiet: bool) -> None:
@@ -80,37 +84,26 @@ def shown(answer: Answer, json: bool, quiet: bool) -> None:
 
 @contextmanager
 def progress(unit: str, quiet: bool = False) -> Iterator[Progress | None]:
-    """Show a bar on standard error while the block runs, if that is a terminal.
+    """Show a line on standard error while the block runs, if that is a terminal.
 
     Give what the block is to tell its progress to, None where nobody looks. What is done of each
-    stage is counted in `unit`. The bar is gone once the block has ended.
+    stage is counted in `unit`. The line is gone once the block has ended.
     """
     if quiet or not sys.stderr.isatty():
         yield None
         return
-    from rich import progress as bars
-    from rich.console import Console
 
-    parts = (
-        bars.TextColumn("{task.description}", markup=False),
-        bars.BarColumn(None),  # as wide as there is room
-        bars.TextColumn("{task.fields[counts]}", markup=False),
-        bars.TimeRemainingColumn(),
-    )
-    screen = Console(stderr=True)
-    with bars.Progress(*parts, console=screen, transient=True, redirect_stdout=False) as bar:
+    def shown(stage: str, done: int, total: int) -> None:
+        counts = f"{done:,} {unit}" * (done > 0)
+        if total >= max(done, 1):
+            counts = f"{done:,} of {total:,} {unit} ({done / total:.0%})"
+        line = f"{printable(stage)}  {counts}"[: shutil.get_terminal_size().columns - 1]
+        print(f"{CLEAR}{line}", end="", file=sys.stderr, flush=True)
 
-        def shown(stage: str, done: int, total: int) -> None:
-            stage = printable(stage)
-            known = total if total >= max(done, 1) else None
-            counts = f"{done:,} of {known:,} {unit}" if known else f"{done:,} {unit}" * (done > 0)
-            if [(task.description, task.total) for task in bar.tasks] != [(stage, known)]:
-                for before in bar.task_ids:
-                    bar.remove_task(before)
-                bar.add_task(stage, total=known, counts=counts)
-            bar.update(bar.task_ids[0], completed=done, counts=counts)
-
+    try:
         yield shown
+    finally:
+        clear_line()
 
 
 class _Pipe(io.FileIO):
@@ -134,11 +127,13 @@ class _Pipe(io.FileIO):
 def harden_streams() -> None:
     """Let this process print to a reader that leaves, and to a terminal that lacks characters."""
     for name in ("stdout", "stderr"):
-        # of a closed one its number: else the next file to be opened would be taken for it
-        stream = getattr(sys, name) or pathlib.Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115
-        handle = stream.fileno()
+        stream = getattr(sys, name)
+        # the number of a closed one is taken: else the next file to be opened would have it
+        handle = stream.fileno() if stream else os.open(os.devnull, os.O_WRONLY)
         if name == "stderr":  # libraries write to the descriptor itself: see `algid.guard.begin`
             handle = os.dup(handle)
         raw = io.BufferedWriter(_Pipe(handle, "wb", closefd=False))
-        text = io.TextIOWrapper(raw, stream.encoding, "backslashreplace", line_buffering=True)
+        text = io.TextIOWrapper(
+            raw, getattr(stream, "encoding", "utf-8"), "backslashreplace", line_buffering=True
+        )
         setattr(sys, name, text)

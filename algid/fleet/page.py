@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from datetime import datetime
 from pathlib import Path
-from urllib.parse import quote
 
 import numpy as np
 import polars as pl
@@ -22,7 +20,6 @@ from algid.report.document import Document, Section, Table
 from algid.report.plot import Panels
 from algid.report.render import page
 
-Links = dict[str, str]
 MOST_ROBOTS = 40  # whose table is printed
 MOST_ROWS = 200
 MOST_NAMED = 3  # in a reason of the verdict
@@ -30,10 +27,8 @@ MOST_PANELS = 12
 MOST_POINTS = 400  # of a robot: the latest logs
 
 
-def write_history(history: History, out: Path, batch: Path) -> tuple[Document, list[Path]]:
+def write_history(history: History, out: Path) -> tuple[Document, list[Path]]:
     """The report of a fleet, and the files it is in: ``fleet.html``, and two tables as Parquet.
-
-    The page leads to the reports in the folder `batch`.
 
     Raises
     ------
@@ -43,14 +38,14 @@ def write_history(history: History, out: Path, batch: Path) -> tuple[Document, l
     for name, frame in (("fleet.parquet", history.windows), ("findings.parquet", history.findings)):
         with whole_file(out / name) as temporary:
             frame.write_parquet(temporary)
-    figure, links = overview(history), links_of(history, batch, out)
+    figure = overview(history)
     folded = history.roster.height > MOST_ROBOTS
     document = Document(
         verdict=verdict(history),
         sections=(
-            Section("numbers", "Findings", (finding_table(history, links),)),
+            Section("numbers", "Findings", (finding_table(history),)),
             Section("logs", "Log by log", (figure,) if figure else ()),
-            Section("robots", "Robots", (robot_table(history, links),), folded=folded),
+            Section("robots", "Robots", (robot_table(history),), folded=folded),
         ),
         kicker="a fleet's history",
         name="Fleet",
@@ -76,7 +71,7 @@ def verdict(history: History) -> Verdict:
     return graded(headline, reasons + history.untested)
 
 
-def robot_table(history: History, links: Links) -> Table:
+def robot_table(history: History) -> Table:
     """Every robot: its latest log, how many logs, how many findings, and their dates."""
     counts, rows = dict(history.findings["robot"].value_counts().iter_rows()), []
     for row in history.roster.head(MOST_ROWS).iter_rows(named=True):
@@ -84,10 +79,10 @@ def robot_table(history: History, links: Links) -> Table:
         own = (visible(row["latest"]), visible(row["robot"]), str(row["logs"]), str(found))
         rows.append((*own, _day(row["first"]), _day(row["last"])))
     columns, cut = "Latest log | Robot | Logs | Findings | From | To", _cut(history.roster, "robot")
-    return Table("Robots", columns, rows, cut, links)
+    return Table("Robots", columns, rows, cut)
 
 
-def finding_table(history: History, links: Links) -> Table:
+def finding_table(history: History) -> Table:
     """Drifts, steps, payloads unlike their labels and outliers, of each the clearest first."""
     rows = []
     for row in history.findings.head(MOST_ROWS).iter_rows(named=True):
@@ -106,19 +101,7 @@ def finding_table(history: History, links: Links) -> Table:
         f"apart. A payload is unlike its label. {_cut(history.findings, 'finding')}"
     )
     columns = "Log | Robot | Parameter | What | By | σ | When"
-    return Table("Findings", columns, rows, note.rstrip(), links)
-
-
-def links_of(history: History, batch: Path, out: Path) -> Links:
-    """Where the reports of the logs that the tables name lie, as seen from `out`."""
-    links = {}
-    for column in (history.roster["latest"], history.findings["job"]):
-        for log in column.head(MOST_ROWS):
-            report = batch / f"{log}.algid" / "report.html"
-            if report.is_file():
-                there = os.path.relpath(report.resolve(), out.resolve())
-                links[visible(log)] = "./" + quote(there)  # `javascript:` leads nowhere
-    return links
+    return Table("Findings", columns, rows, note.rstrip())
 
 
 def _cut(every: pl.DataFrame, things: str) -> str:

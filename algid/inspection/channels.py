@@ -6,16 +6,13 @@ Limits that cut torques off are found by motion, reported, and what lies beyond 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from algid.base.criteria import CUT
-from algid.base.errors import LogError
 from algid.base.quantiles import median, medians, quantile
 from algid.estimators.saturation import UNSEEN, Limit, Saturation, saturation_of
 from algid.inspection.figures import (
@@ -31,7 +28,6 @@ from algid.inspection.figures import (
 )
 from algid.log import Log, Origin
 from algid.notices import Notice, Remedy, nevertheless
-from algid.readers.formats import entries_at
 from algid.signals.segments import Segment, segments
 from algid.signals.spacing import NEAR, near_stamps
 
@@ -50,13 +46,6 @@ _OFF_STEP, _IN_STEP = 0.15, 0.9
 _TURN = 2 * math.pi
 _AS_DEGREES = 0.055
 """Of the logarithm of a degree: a fifth of a ratio of angles to velocities, either way."""
-_TORQUES = re.compile(r"(?<![a-z])(torques?|efforts?|tau(?![a-z])|moment)", re.IGNORECASE)
-_CURRENTS = re.compile(r"(?<![a-z])(currents?|i_?q)(?![a-z])", re.IGNORECASE)
-_OTHER = re.compile(
-    r"cmd|command|desired|target|limit|(?<![a-z])des(?![a-z])|\(empty\)$", re.IGNORECASE
-)
-_MOST = 3
-"""Channels that are named in the place of a torque that is none."""
 
 
 def _found(code: str, origin: Origin, name: str, *remedies: Remedy, **numbers: Any) -> Notice:
@@ -88,8 +77,7 @@ def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
             continue
         if largest < _DENORMAL or tau.min() == tau.max():
             case = "constant" if largest >= _DENORMAL else "tiny" if largest else "zero"
-            remedies = torques_beside(log, name)
-            remedies = remedies or [Remedy({f"{name}.source": None}, "name the measured torque")]
+            remedies = [Remedy({f"{name}.source": None}, "name the measured torque")]
             if log.tau[2 - joint].any() and not passive:
                 remedies.append(Remedy({"passive": joint}, "for a joint without a motor"))
             numbers = {"case": case, "largest": largest, "value": float(tau[0])}
@@ -97,29 +85,6 @@ def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
         elif (share := saturated_share(tau)) > 0.01:
             case = "true" if joint - 1 in known.sound else "open"
             yield _found("SATURATED_EFFORT", log.origin, name, percent=100 * share, case=case)
-
-
-def torques_beside(log: Log, channel: str) -> list[Remedy]:
-    """What else in the log's file may be the torque `channel`, and the settings that take it.
-
-    Torques come before currents, and those of the same joint, by its number, before all others.
-    """
-    try:
-        entries = entries_at(Path(log.origin.path))
-    except LogError:  # a log in memory, or a file that is gone
-        return []
-    used, found = set(log.origin.mapping.values()), []
-    amperes = {f"{channel}.unit": "A", f"{channel}.torque_constant": None}
-    for words, unit in ((_TORQUES, {}), (_CURRENTS, amperes)):
-        for entry in entries:
-            topic = {f"{channel}.topic": entry.name} if entry.fields else {}
-            for field in entry.fields or (entry.name,):
-                place = f"{entry.name}: {field}" if topic else field
-                if words.search(field) and not _OTHER.search(field) and place not in used:
-                    takes = topic | {f"{channel}.source": field} | unit
-                    found.append((channel[-1] not in place, Remedy(takes, "the log also holds")))
-    found.sort(key=lambda one: one[0])
-    return [remedy for _, remedy in found[:_MOST]]
 
 
 def held_efforts(log: Log) -> Iterator[Notice]:

@@ -7,7 +7,7 @@ each. Terminal, Markdown and page set it, each in one way for all of them.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -30,14 +30,12 @@ class Table:
     columns : headings with " | " between; one that holds nothing but dashes is not shown, and a
         terminal without room for all leaves out the last ones
     note : one line below it
-    links : where the names of rows lead, which only a page shows
     """
 
     title: str
     columns: str
     rows: Sequence[tuple[str, ...]]
     note: str = ""
-    links: Mapping[str, str] | None = None
 
     @property
     def heads(self) -> list[tuple[int, str, Kind]]:

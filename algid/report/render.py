@@ -1,4 +1,4 @@
-"""A document as a page and as Markdown, and a result in a notebook: by the templates.
+"""A document as a page and as Markdown, by the templates.
 
 A page is one offline file that carries the plotting library, packed. Only scripts with its nonce
 run, which follows from the whole content: a name out of a log could not run even if it slipped
@@ -26,8 +26,6 @@ from algid.base.files import whole_file
 from algid.base.text import visible
 from algid.notices import MOST_REASONS
 from algid.report.document import Document
-from algid.results import Result
-from algid.results.rows import rows_of
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -74,14 +72,6 @@ def markdown(document: Document) -> str:
     command = document.verdict.command or ""
     code = Markup("    " + visible(command, len(command)))
     return _environment(_escaped).get_template("report.md").render(document=document, code=code)
-
-
-def notebook(result: Result, title: str) -> str:
-    """The verdict with its first reasons, and a table of the estimates under `title`."""
-    template = _environment(_shown).get_template("notebook.html")
-    rows = rows_of(result, result.estimates)
-    shown = {"result": result, "title": title, "rows": rows, "most": MOST_REASONS, "repr": repr}
-    return template.render(shown)
 
 
 @cache

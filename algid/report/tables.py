@@ -13,6 +13,7 @@ from typing import Any
 from algid.arm import CONSTANT_NAMES
 from algid.base.text import (
     ABSENT,
+    as_toml,
     file_name,
     formatted,
     joined,
@@ -115,20 +116,13 @@ def terms_table(fit: FitSummary | None) -> Table:
     """Optional terms of the torque and their worth."""
     rows = []
     for term in fit.terms if fit else ():
-        change = None if term.gain_heldout is None else -100 * term.gain_heldout or 0.0  # no −0.00
-        numbers = ((term.delta_bic, "+.1f"), (change, "+.2f"), (term.evidence, "+.1f"))
-        cells = (formatted(value, form) for value, form in numbers)
+        cells = (formatted(value, "+.1f") for value in (term.delta_bic, term.evidence))
         rows.append((term.term, *cells, yes_or_no(term.kept), term.why))
-    note = (
-        "A negative change favours the term: of BIC, or of the squared error of whole logs or "
-        "blocks, each predicted from the others. Of these a term is kept if its log odds are "
-        "positive too."
-    )
     return Table(
         "Terms tried",
-        "Term | Change of BIC | Held-out error, % | Log odds | Kept | Why",
+        "Term | Change of BIC | Log odds | Kept | Why",
         rows,
-        note,
+        "A negative change of BIC and positive log odds favour the term.",
     )
 
 
@@ -203,19 +197,11 @@ def flat_settings(settings: Mapping[str, Any], prefix: str = "") -> dict[str, st
     for name, value in settings.items():
         if isinstance(value, Mapping):
             flat |= flat_settings(value, f"{prefix}{name}.")
+        elif value in (None, "", (), []):
+            flat[f"{prefix}{name}"] = ABSENT
         else:
-            flat[f"{prefix}{name}"] = _in_profile(value)
+            flat[f"{prefix}{name}"] = value if isinstance(value, str) else as_toml(value)
     return flat
-
-
-def _in_profile(value: object) -> str:
-    if isinstance(value, bool):
-        return yes_or_no(value)
-    if isinstance(value, list | tuple):
-        value = ", ".join(map(_in_profile, value))
-    if isinstance(value, float):
-        return f"{value:.12g}"
-    return ABSENT if value in (None, "") else str(value)
 
 
 def provenance_table(rows: Sequence[tuple[str, str]], logs: Sequence[LogSummary]) -> Table:

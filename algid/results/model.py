@@ -46,7 +46,7 @@ class Status(StrEnum):
 
 
 class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 
 
 class Estimate(_Model):
@@ -121,15 +121,13 @@ class WhitenessTest(_Model):
 class TermCriterion(_Model):
     """Worth of an optional term of the model: change of the criterion, negative is better.
 
-    Where the terms were chosen automatically, `gain_heldout` is by how much the term lowers the
-    squared error of torque that was held out, as a share, `evidence` the log of the odds for it,
-    and `why` says what decided.
+    Where the terms were chosen automatically, `evidence` is the log of the odds for the term, and
+    `why` says what decided.
     """
 
     term: str
     delta_bic: float | None = None
     kept: bool
-    gain_heldout: float | None = None
     evidence: float | None = None
     why: str = ""
 
@@ -149,7 +147,6 @@ class Endogeneity(_Model):
 class TorqueModel(_Model):
     """The torque's terms beside eq. (1), friction's speeds in rad/s, and who chose the terms.
 
-    `held_out` says what was left out of the fit to try each term: whole logs, or blocks of them.
     `shrunk` names the coefficients of terms that were not chosen: each is what the logs and what
     physics expects of it agree on.
     """
@@ -158,7 +155,6 @@ class TorqueModel(_Model):
     coulomb_speed: float
     stribeck_speed: float
     chosen_by: Literal["logs", "settings", "parameters"]
-    held_out: Literal["logs", "blocks"] | None = None
     shrunk: list[str] = []
 
 

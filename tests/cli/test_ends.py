@@ -17,7 +17,7 @@ import pytest
 
 import algid
 from algid.api.batch import answer
-from algid.api.compare import labels_of as labels
+from algid.api.options import stem_of
 from algid.base.errors import SettingError
 from algid.batches.jobs import Job, JobRecord, JobStatus
 from algid.batches.run import Batch, Batched
@@ -129,15 +129,10 @@ def test_a_watch_complains_once_and_retries_what_failed_once(
     assert heard == ["logs: gone", "twice"]
 
 
-def test_results_are_named_by_what_tells_them_apart(tmp_path: Path) -> None:
-    def named(*paths: str) -> list[str]:
-        return labels([tmp_path / path for path in paths])
-
-    assert named("a.algid", "b.algid/result.json") == ["a", "b"]
-    assert named("mon/a.algid", "fri/a.algid") == ["mon/a", "fri/a"]
-    assert named("x/1/a.algid", "x/2/a.algid", "y/1/b.algid") == ["x/1/a", "x/2/a", "y/1/b"]
-    assert named("a.algid", "a.algid/result.json") == ["a", "a"]
-    assert call("compare", tmp_path / "a.algid").err == (
+def test_results_are_named_by_their_folders(tmp_path: Path) -> None:
+    assert stem_of(tmp_path / "mon/a.algid") == "a"
+    assert stem_of(tmp_path / "b.algid/result.json") == "b"
+    assert call("compare", tmp_path / "b.algid").err == (
         "algid: compare: expected two results or more, found 1; name another one\n"
     )
 

@@ -377,14 +377,14 @@ def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: P
     assert [one.text for one in verdict(history).reasons] == [
         "2 parameters changed at once: k1 of r1 and k3 of r1"
     ]
-    (row,) = [row for row in finding_table(history, {}).rows if row[2] == "k1"]
+    (row,) = [row for row in finding_table(history).rows if row[2] == "k1"]
     step = found.filter(parameter="k1").row(0, named=True)
     value, half = (
         significant(100 * step[n] / step["expected"], 2 + (n == "value")) for n in ("value", "half")
     )
     assert row[1:5] == ("r1", "k1", "step", f"{value} ± {half} %")
     assert row[6] == "2026-03-21 to 2026-03-22"
-    assert [row[3] for row in robot_table(history, {}).rows] == ["none", "2"]
+    assert [row[3] for row in robot_table(history).rows] == ["none", "2"]
     assert verdict(history).headline == "2 robots, 240 logs: 2 steps"
     plot = overview(history)
     assert plot is not None
@@ -423,7 +423,7 @@ def test_a_large_fleet_is_cut_and_what_was_not_tested_is_named(tmp_path: Path) -
     told = [("nameless", 1), ("undated", 1), ("steady", 202)]
     assert [(one.case, one.numbers["count"]) for one in reasons] == told
     assert json.loads(history.as_json())["untested"] == [one.text for one in reasons]
-    table, plot = robot_table(history, {}), overview(history)
+    table, plot = robot_table(history), overview(history)
     assert (len(table.rows), table.note) == (200, "202 robots; the first 200 are shown.")
     assert table.rows[0] == ("j1", "j1", "1", "not tested", "–", "–")
     assert plot is not None

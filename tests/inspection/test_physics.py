@@ -13,10 +13,10 @@ import numpy as np
 import polars as pl
 import pytest
 
+from algid.api.inspect import draft_profile
 from algid.estimators.conventions import AS_READ, Convention
 from algid.inspection.checks import inspect_log
 from algid.inspection.conventions import judged, mend, mends, recorded
-from algid.inspection.draft import draft_profile
 from algid.inspection.figures import dynamic_figures
 from algid.log import Log, Origin, Reading
 from algid.notices import Notice, Remedy

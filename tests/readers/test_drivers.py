@@ -11,7 +11,6 @@ import polars as pl
 import pytest
 
 from algid.inspection.checks import inspect_log
-from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
 from tests.readers.logs import EPOCH_NS, noise_log
@@ -79,41 +78,16 @@ def test_of_two_topics_with_both_joints_it_is_said_which_was_taken(tmp_path: Pat
     assert not [notice for notice in chosen.notices if notice.code == "JOINT_ORDER"]
 
 
-def held_beside(log: Log, joint: int) -> list[dict[str, object]]:
-    """The settings that are told to take other channels for the torque of a joint that is zero."""
-    zero = [one for one in inspect_log(log).findings if one.code == "EFFORT_ZERO"]
-    remedies = [
-        remedy for one in zero for remedy in one.remedies if remedy.when == "the log also holds"
-    ]
-    return [dict(remedy.settings) for remedy in remedies if f"tau{joint}.source" in remedy.settings]
-
-
-def test_a_torque_of_zeros_names_what_else_the_log_holds(tmp_path: Path) -> None:
-    """A topic of wrenches and one of currents, and how they are taken."""
+def test_a_torque_beside_one_of_zeros_is_taken_by_its_topic_and_field(tmp_path: Path) -> None:
     messages = []
     for row, stamp in enumerate(LOG.stamp_ns.tolist()):
         state = joint_state(stamp, position=LOG.theta[:, row].tolist(), effort=[0.0, 0.0]).done()
         wrench = {"wrench": {"force": {"z": 1.0}, "torque": {"z": float(LOG.tau[0, row])}}}
-        drive = {"motor_current": float(row), "target_current": 1.0}
-        messages.append((TOPIC, stamp, state))
-        messages.append(("/ft", stamp, json.dumps(wrench).encode()))
-        messages.append(("/drive", stamp, json.dumps(drive).encode()))
-    write_mcap(tmp_path / "a.mcap", messages, {"/ft": ANY, "/drive": ANY})
-    log = read_log(tmp_path / "a.mcap")
-    current = {"tau1.unit": "A", "tau1.torque_constant": None}
-    assert held_beside(log, 1) == [
-        {"tau1.topic": "/ft", "tau1.source": "wrench.torque.z"},
-        {"tau1.topic": "/drive", "tau1.source": "motor_current", **current},
-    ]
-    assert {"tau2.topic": "/ft", "tau2.source": "wrench.torque.z"} in held_beside(log, 2)
+        messages += [(TOPIC, stamp, state), ("/ft", stamp, json.dumps(wrench).encode())]
+    write_mcap(tmp_path / "a.mcap", messages, {"/ft": ANY})
+    found = inspect_log(tmp_path / "a.mcap").findings
+    zeros = [one.remedies[0].settings for one in found if one.code == "EFFORT_ZERO"]
+    assert zeros == [{"tau1.source": None}, {"tau2.source": None}]
     profile = {"tau1": {"topic": "/ft", "source": "wrench.torque.z"}}
     named = read_log(tmp_path / "a.mcap", Profile.model_validate(profile))
     assert np.array_equal(named.tau[0], LOG.tau[0])
-
-
-def test_columns_that_may_be_the_torque_are_named(tmp_path: Path) -> None:
-    names = ("t", "q1", "q2", "tau1", "tau2", "torque_sensor", "torque_limit")
-    t, tau = LOG.t, LOG.tau
-    table = dict(zip(names, (t, *LOG.theta, 0 * t, tau[1], tau[0], t), strict=True))
-    pl.DataFrame(table).write_csv(tmp_path / "a.csv")
-    assert held_beside(read_log(tmp_path / "a.csv"), 1) == [{"tau1.source": "torque_sensor"}]

@@ -47,7 +47,7 @@ def test_only_what_was_set_or_read_otherwise_is_shown(result: Result) -> None:
     several[1] = several[1].model_copy(update={"estimator": "weak"})
     found = compare(several, ["a", "b"])
     assert found.settings == {
-        "window": ["–", "4"],
+        "window": ["–", "4.0"],
         "estimator": ["refined", "weak"],
         "unloaded log.channels.theta1.unit": ["deg", "rad"],
     }
