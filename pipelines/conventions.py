@@ -16,12 +16,11 @@ import numpy as np
 
 from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
 from algid.base.errors import LogError
-from algid.estimators.convention_search import judge
 from algid.estimators.conventions import AS_READ
 from algid.identification.identify import identify
 from algid.inspection.conventions import judged as conventions_of
 from algid.inspection.conventions import mend
-from algid.log import Log, Origin, Reading
+from algid.log import ChannelReading, Log, Origin, Reading
 from algid.results import Result
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
@@ -59,6 +58,11 @@ SPOILS: dict[str, Spoil] = {
     "zero hanging": lambda a, b, s, t: (a + np.pi / 2, b, s, t),
     "zero upright": lambda a, b, s, t: (a - np.pi / 2, b, s, t),
     "zero of θ2 off by 90°": lambda a, b, s, t: (a, b + np.pi / 2, s, t),
+    # what a plain log becomes where a profile says what is not so
+    "said to be absolute": lambda a, b, s, t: (a, b - a, s, t),
+    "said to be driven from the base": lambda a, b, s, t: (a, b, s + t, t),
+    "said to be in degrees": lambda a, b, s, t: (np.radians(a), np.radians(b), s, t),
+    "said to be geared": lambda a, b, s, t: (a / 50, b, s, t),
     # what installation, sensors and recorders do to a log
     "zero of θ1 off by 40°": lambda a, b, s, t: (a + np.radians(40), b, s, t),
     "5 % of the samples lost, time renumbered": lambda *channels: _pierced(channels),
@@ -66,6 +70,14 @@ SPOILS: dict[str, Spoil] = {
     "torques × 6": lambda a, b, s, t: (a, b, 6 * s, 6 * t),
     "torques ÷ 6": lambda a, b, s, t: (a, b, s / 6, t / 6),
 }
+_DEGREES = ChannelReading("theta", "deg", "profile", np.pi / 180)
+SAID = {
+    "said to be absolute": Reading(second_angle="absolute"),
+    "said to be driven from the base": Reading(drive="base"),
+    "said to be in degrees": Reading(dict.fromkeys(("theta1", "theta2"), _DEGREES)),
+    "said to be geared": Reading({"theta1": ChannelReading("theta1", "rad", "profile", 1 / 50)}),
+}
+"""How such a log was read."""
 NOTICED = {
     "zero of θ1 off by 40°": "PHASES",
     "5 % of the samples lost, time renumbered": "LOST_SAMPLES",
@@ -93,8 +105,8 @@ def motion_of(name: str, *, loaded: bool = False) -> tuple[FloatArray, Simulated
     return k, simulate(moved, wide_multi_sine(arm, sum(name.encode()) + loaded), t)
 
 
-def log_of(motion: SimulatedMotion, spoil: Spoil, friction: int, seed: int = 0) -> Log:
-    """The log of a motion by noisy sensors, spoiled.
+def log_of(motion: SimulatedMotion, title: str, friction: int, seed: int = 0) -> Log:
+    """The log of a motion by noisy sensors, spoiled by the mistake of that name.
 
     The motors overcome Coulomb friction where there is some.
     """
@@ -104,14 +116,15 @@ def log_of(motion: SimulatedMotion, spoil: Spoil, friction: int, seed: int = 0) 
         tau = tau + COULOMB * np.abs(tau).max(axis=1, keepdims=True) * np.tanh(motion.omega / 0.02)
     theta = motion.theta + SIGMA_THETA * rng.standard_normal(tau.shape)
     tau = tau + SIGMA_TAU * rng.standard_normal(tau.shape)
-    a, b, s, t = spoil(*theta, *tau)
+    a, b, s, t = SPOILS[title](*theta, *tau)
     stamps = np.round(motion.t[: a.size] * 1e9).astype(np.int64)
-    return Log(stamps, np.stack([a, b]), np.stack([s, t]), Origin("arm.csv", "csv", {}))
+    origin = Origin("arm.csv", "csv", {}, reading=SAID.get(title, Reading()))
+    return Log(stamps, np.stack([a, b]), np.stack([s, t]), origin)
 
 
 def mended(log: Log, k: FloatArray) -> bool:
     """Whether the convention that is named brings the constants of inertia and gravity back."""
-    judged = judge(log.theta, log.tau, 1 / RATE)
+    judged = conventions_of(log)
     if judged is None or not judged.alone or judged.best.convention == AS_READ:
         return False
     return bool(np.allclose(judged.best.k[:5], k[:5], rtol=ALIKE, atol=ALIKE * k[:5].max()))
@@ -141,7 +154,7 @@ def draw(title: str, arm: str, number: int) -> Seen:
     if title == EXCHANGED:
         return exchanged(arm, number)
     k, motion = motion_of(arm)
-    log = log_of(motion, SPOILS[title], number)
+    log = log_of(motion, title, number)
     named = mend(log.origin, conventions_of(log))
     right = title == "nothing" or title in INVISIBLE
     try:
@@ -178,7 +191,7 @@ def exchanged(arm: str, number: int) -> Seen:
     turning = Origin("arm.csv", "csv", {}, reading=Reading(accepted=("DEGREES",)))
     loaded, unloaded = (
         replace(
-            log_of(motion_of(arm, loaded=kind)[1], SPOILS["nothing"], number, seed=kind),
+            log_of(motion_of(arm, loaded=kind)[1], "nothing", number, seed=kind),
             origin=turning,
         )
         for kind in (True, False)

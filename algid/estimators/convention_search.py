@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
+from itertools import permutations, product
 from math import copysign, pi, remainder
 from operator import itemgetter
 
@@ -23,6 +23,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.base.names import evenly_spread, outside, vector
 from algid.base.significance import SURE
+from algid.base.units import ANGLE
 from algid.estimators.convention_sums import (
     COLUMNS,
     WINDOW,
@@ -50,10 +51,12 @@ _SHIFTED = 3  # conventions, of the best, whose zeros are set free
 _REACH, _SETTLED = 0.2, 1e-5  # rad, of the grid on which free zeros are sought
 _MOST_GRIDS = 100
 _GRID = np.array(list(product((0.0, -0.5, 0.5, -1.0, 1.0), repeat=2)))  # its middle first
-_SCALES = (0.1, 400.0)  # from turns (0.16) to the motors behind large gears
+_SCALES = (0.0025, 400.0)  # from angles read in degrees that are in turns to large gears' motors
 _WIDEST = 40.0  # rad: no scale is tried under which a joint would move further
-_EXACT = (180 / pi, 1 / (2 * pi)) + tuple(range(2, 401))
-"""Scales of their own right: degrees, turns, whole gears."""
+UNIT_SCALES = {(read, true): ANGLE[read] / ANGLE[true] for read, true in permutations(ANGLE, 2)}
+"""Of angles that were read in one unit and are in another."""
+_EXACT = (*UNIT_SCALES.values(), *(gear**way for gear in range(2, 401) for way in (1, -1)))
+"""Scales of their own right: of units, and of whole gears and their inverses."""
 _NEAR = 0.01  # of a scale: how near one of those it is tried for them
 
 _NEXT_TO_AXIS, _LONG = 0.02, 1.5
@@ -187,13 +190,16 @@ class Judgement:
 class Recorded:
     """Angles and torques (2, N) of a log as it was read, in rad and N m, `dt` s apart.
 
-    The joint `passive` (1 or 2) has no motor.
+    The joint `passive` (1 or 2) has no motor. `absolute` and `base` are what a convention has where
+    the reference of θ2 or the second motor's place is wrong: -1 where the log was read by them.
     """
 
     theta: FloatArray
     tau: FloatArray
     dt: float
     passive: int | None = None
+    absolute: int = 1
+    base: int = 1
 
     @property
     def usable(self) -> bool:
@@ -216,16 +222,16 @@ def judge(
 def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgement | None:
     """Try every convention on logs of one arm that were read alike, on the stretches that move.
 
-    None where they do not move for six windows, differ in their passive joint, or the torque of a
-    motor is zero throughout. None other than as it was read stands where a bent arm explains as
+    None where they do not move for six windows, were not read alike, or the torque of a motor is
+    zero throughout. None other than as it was read stands where a bent arm explains as
     much: zeros turn three moments by two angles, centres of mass off the links' lines, or a
     payload, turn each by its own.
     """
     usable = evenly_spread([log for log in logs if log.usable], MOST_LOGS)
-    passives = {log.passive for log in usable}
+    ways = {(log.passive, log.absolute, log.base) for log in usable}
     # no motor's torque is asked for at a passive joint
     idle = {joint for joint in (1, 2) if not any(log.tau[joint - 1].any() for log in usable)}
-    if len(passives) != 1 or idle - passives:
+    if len(ways) != 1 or idle - {usable[0].passive}:
         return None
     trials = Trials(usable, gravity)
     if trials.seconds < _SHORTEST:
@@ -294,7 +300,7 @@ class Trials:
             moving([thinned(log.theta, log.tau, log.dt, rate, longest) for log in logs])
             for rate, longest in each
         )
-        self._passive = logs[0].passive
+        self._read = logs[0]
         self._names = ZEROED
         self._free = np.eye(len(COLUMNS))[None]
         self._turns = _TURNS
@@ -306,22 +312,22 @@ class Trials:
         self.seconds = sum(log.seconds for log in self._fine)
         self.apart = max(APART, 2 * EVIDENCE * WINDOW / max(self.seconds, _SHORTEST))
         """By how much the scores of two distinct conventions differ."""
-        self._passes: dict[tuple[Convention, bool], tuple[ConventionSums, ConventionSums]] = {}
+        self._passes: dict[tuple[Convention, bool], list[ConventionSums]] = {}
 
     def under(self, family: Convention, *zeros: tuple[float, float]) -> list[Candidate]:
         """The candidates of a family with each of some zeros."""
         sums = self._sums(family, self._fine)
         T = np.stack([self._place(zero) for zero in zeros])
-        c, left, covariance = solved(sums, [family], T, self._passive)
+        c, left, covariance = solved(sums, [family], T, self._read.passive)
         every = zip(zeros, c, covariance, left, _merits(left).tolist(), strict=True)
         return [
             Candidate(family, zero, self._names, k, V, share, score, sums.speed)
             for zero, k, V, share, score in every
         ]
 
-    def weightless(self) -> Candidate:
-        """The logs as they were read, of an arm on which gravity does not act."""
-        return Trials(self._logs, gravity=False).under(AS_READ, AS_READ.zero)[0]
+    def reweighed(self) -> Candidate:
+        """The logs as they were read, without gravity where it was said to act, or with it."""
+        return Trials(self._logs, gravity=K4 not in self._names).under(AS_READ, AS_READ.zero)[0]
 
     def zeroed(self, family: Convention) -> Candidate:
         """The candidate of a family with the zeros that fit best."""
@@ -334,7 +340,7 @@ class Trials:
         gone over from the least of that on, until no lawful convention of the rest can come near.
         """
         bounds: list[tuple[float, Convention]] = []
-        for families in _families(self._passive):
+        for families in _families(self._read):
             left = self._with_phases(families, self._fine)[1]
             bounds += zip(_merits(left).tolist(), families, strict=True)
         found = self.under(AS_READ, AS_READ.zero)
@@ -371,7 +377,7 @@ class Trials:
         With them the shares (F, 2) that are left.
         """
         sums = self._sums(families[0], logs)
-        c, left, _ = solved(sums, families, self._free, self._passive)
+        c, left, _ = solved(sums, families, self._free, self._read.passive)
         return c @ self._free[0].T, left
 
     def bent(self) -> float | None:
@@ -394,7 +400,7 @@ class Trials:
 
         def scores(zeros: FloatArray) -> FloatArray:
             T = np.stack([self._place((one, two)) for one, two in zeros.tolist()])
-            return _sizes(solved(sums, [family], T, self._passive)[1])
+            return _sizes(solved(sums, [family], T, self._read.passive)[1])
 
         best = _least(scores, start)
         return remainder(float(best[0]), 2 * pi), remainder(float(best[1]), 2 * pi)
@@ -442,26 +448,26 @@ class Trials:
         )
         key = angles, logs is self._fine
         if key not in self._passes:
-            self._passes[key] = summed(angles, logs)
-        return self._passes[key][family.base]
+            self._passes[key] = summed(angles, logs, (0, self._read.base))
+        return self._passes[key][abs(family.base)]
 
 
-def _families(passive: int | None = None) -> Iterator[list[Convention]]:
+def _families(read: Recorded) -> Iterator[list[Convention]]:
     """Every convention without scale and zeros, those of the same angles and drive together.
 
     The torque of a `passive` joint has no sign, and changes places with none.
     """
     for swapped, sign, absolute, base in product(
-        (False, True), (1, -1), (False, True), (False, True)
+        (False, True), (1, -1), (0, read.absolute), (0, read.base)
     ):
         angles = Convention(swapped=swapped, signs=(1, sign), absolute=absolute, base=base)
         torques = product((False, True), (1, -1), (1, -1))
         every = []
         for swap, one, two in torques:
             signs = (one, two)
-            if passive is None or (not swap and signs[passive - 1] > 0):
+            if read.passive is None or (not swap and signs[read.passive - 1] > 0):
                 every.append(replace(angles, torques_swapped=swap, torque_signs=signs))
-        if passive is None or not base:
+        if read.passive is None or not base:
             yield every
 
 

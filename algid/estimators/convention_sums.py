@@ -129,32 +129,34 @@ def moving(logs: Sequence[ThinnedLog]) -> list[ThinnedLog]:
     return [replace(log, kept=np.any(log.squares >= least, axis=0)) for log in logs]
 
 
-def summed(angles: Convention, logs: Sequence[ThinnedLog]) -> tuple[ConventionSums, ConventionSums]:
+def summed(
+    angles: Convention, logs: Sequence[ThinnedLog], drives: Sequence[int]
+) -> list[ConventionSums]:
     """Sums over the windows of logs of one arm for angles so mapped.
 
-    With the second motor in its joint, and with it at the base.
+    One for each of the second motor's `drives`: see `Convention.base`.
     """
     size = len(COLUMNS)
-    grams, crosses = np.zeros((2, 2, size, size)), np.zeros((2, 2, size, 2))
+    grams = np.zeros((len(drives), 2, size, size))
+    crosses = np.zeros((len(drives), 2, size, 2))
     power, squares, independent = np.zeros(2), np.zeros(2), 0.0
     for log in logs:
         omega = angles.angles(log.omega)  # linear without zeros
         motion = Motion(angles.angles(log.theta), omega, omega)
         X = log.windows.columns(MODEL, motion)[:, _PLACES][:, :, log.kept]
         torques, weight = log.torques[:, log.kept], X.shape[2] / OVERLAP
-        both = X, np.stack([X[0] - X[1], X[1]])
-        for gram, cross, Y in zip(grams, crosses, both, strict=True):
+        for gram, cross, base in zip(grams, crosses, drives, strict=True):
+            Y = np.stack([X[0] - base * X[1], X[1]])
             gram += Y @ Y.swapaxes(1, 2)
             cross += Y @ torques.T
         power += np.sum(torques**2, axis=1)
         squares += weight * np.mean(omega**2, axis=1)
         independent += weight
     speed = np.sqrt(squares / max(independent, 1e-300))
-    joint, base = (
+    return [
         ConventionSums(gram, cross, power, speed, independent)
         for gram, cross in zip(grams, crosses, strict=True)
-    )
-    return joint, base
+    ]
 
 
 def solved(

@@ -1,9 +1,9 @@
 """Conventions of angles and torques: what each does to a log, and what no log can determine.
 
 A log may have been recorded under another convention than algid's: signs, order of the joints, θ2
-from the horizontal, another zero, angles of the motors, a second motor that stands at the base.
-Each such mistake is a linear map of (θ, τ), so each is tried: the log is mapped back and eq. (1),
-with friction and offsets, fitted in its weak form.
+from the horizontal, another zero, angles of the motors, a second motor that stands at the base. Or
+it was read under another one, and is plain. Each such mistake is a linear map of (θ, τ), so each is
+tried: the log is mapped back and eq. (1), with friction and offsets, fitted in its weak form.
 
 **Zeros are linear.** With θ1 + δ1 and θ2 + δ2 in the place of the angles, k4 cos θ1 becomes k4 cos
 δ1 cos θ1 − k4 sin δ1 sin θ1; likewise k2 with δ1 + δ2, and k1 with δ2. Each of the three has
@@ -41,18 +41,19 @@ class Convention:
     """What has to be done to angles and torques as they were read; by default nothing.
 
     The angles of the joints change places, are divided by `scale`, multiplied by `signs`, θ1 is
-    taken off an `absolute` θ2, and `zero` is added. The torques change places and are multiplied
-    by `torque_signs`. `base`: the second motor stands at the base.
+    taken off an `absolute` θ2, and `zero` is added. The torques change places, are multiplied by
+    `torque_signs`, and τ2 is added to τ1 where the second motor stands at the `base`. Of a θ2 that
+    was read as absolute and is not, or a motor read as one at the base, these are -1.
     """
 
     swapped: bool = False
     scale: tuple[float, float] = (1.0, 1.0)
     signs: tuple[int, int] = (1, 1)
-    absolute: bool = False
+    absolute: int = 0
     zero: tuple[float, float] = (0.0, 0.0)
     torques_swapped: bool = False
     torque_signs: tuple[int, int] = (1, 1)
-    base: bool = False
+    base: int = 0
 
     def angles(self, theta: FloatArray) -> FloatArray:
         """Angles (2, N) in rad under algid's convention out of those that were read."""
@@ -60,8 +61,7 @@ class Convention:
             theta = theta[::-1]
         first = theta[0] * (self.signs[0] / self.scale[0])
         second = theta[1] * (self.signs[1] / self.scale[1])
-        if self.absolute:
-            second = second - first
+        second = second - self.absolute * first
         return np.stack([first, second]) + np.array(self.zero)[:, None]
 
     def torques(self, tau: FloatArray) -> FloatArray:
@@ -69,9 +69,7 @@ class Convention:
         if self.torques_swapped:
             tau = tau[::-1]
         first, second = self.torque_signs[0] * tau[0], self.torque_signs[1] * tau[1]
-        if self.base:
-            first = first + second
-        return np.stack([first, second])
+        return np.stack([first + self.base * second, second])
 
     def mirrored(self) -> Convention:
         """The same arm seen from behind: another convention with the same constants."""

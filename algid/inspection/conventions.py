@@ -14,24 +14,25 @@ from typing import Any
 
 import numpy as np
 
+from algid.base.units import ANGLE
 from algid.estimators.convention_search import (
     MET,
     MOST_LOGS,
+    UNIT_SCALES,
+    Candidate,
     Judgement,
     Recorded,
     judge_together,
 )
 from algid.estimators.conventions import AS_READ, Convention
-from algid.log import ZEROS, Log, Origin, Reading
-from algid.model import K2, K3, K4, K5
+from algid.log import ZEROS, ChannelReading, Log, Origin, Reading
+from algid.model import K2, K3, K4, K5, Model
 from algid.notices import Notice, Remedy
 from algid.signals.segments import stretches
 
 # rad: a zero this close, or a centre of mass off its link, is a phase and no other convention
 _SMALL = np.pi / 4
 _SAME = 1e-3  # of a scale or rad: as good as equal
-_UNITS = {180 / pi: "deg", 1 / (2 * pi): "rev"}
-"""Of angles, by the scales that are no motor's."""
 _WRONG = {
     "joints": "the joints are swapped",
     "theta.source": "the angles of the joints are swapped",
@@ -40,9 +41,10 @@ _WRONG = {
     "theta.sign": "the sign of θ{joint} is wrong",
     "tau.sign": "the sign of τ{joint} is wrong",
     "theta.unit": "θ{joint} is in {value}",
-    "theta.gear_ratio": "θ{joint} is the motor's angle, {value:.4g} times the joint's",
-    "second_angle": "θ2 counts from the horizontal or the vertical, not from link 1",
-    "drive": "the second motor stands at the base",
+    "theta.gear_ratio": "θ{joint} counts {value:.4g} times the joint's angle",
+    "second_angle": "θ2 is {value}",
+    "drive": "the second motor stands at the {value}",
+    **dict.fromkeys(("effort", "gravity"), "the torques carry the arm's weight"),
     "zero": "θ1 is zero where link 1 is {value}",
     "offsets": "the angles have to be offset by {value} rad",
 }
@@ -69,11 +71,17 @@ def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
 
 def recorded(log: Log, seconds: float = math.inf) -> list[Recorded]:
     """The stretches of a log without a gap, the longest first, `seconds` of them in all."""
-    parts, passive = [], log.origin.reading.passive
+    parts, reading = [], log.origin.reading
+    # what was said of θ2 and of the second motor may be wrong
+    way = (
+        reading.passive,
+        -1 if reading.second_angle == "absolute" else 1,
+        -1 if reading.drive == "base" else 1,
+    )
     for stretch in sorted(stretches([log]), key=len, reverse=True)[:MOST_LOGS]:
         part = stretch.part(0, int(min(len(stretch), seconds / stretch.dt)))
         seconds -= len(part) * part.dt
-        parts.append(Recorded(part.theta.copy(), part.tau.copy(), part.dt, passive))
+        parts.append(Recorded(part.theta.copy(), part.tau.copy(), part.dt, *way))
     return parts
 
 
@@ -95,14 +103,20 @@ def mend(origin: Origin, judgement: Judgement | None) -> Notice | None:
     origin : how the log was read
     judgement : of `judged`
     """
-    if judgement is None or not judgement.alone:
+    if judgement is None:
         return None
-    broken, best = judgement.as_read.broken, judgement.best
-    settings = _settings(best.convention, origin)
-    is_phase = best.family == AS_READ and max(map(abs, best.zero)) < _SMALL
-    if is_phase or not settings:  # without settings it is how the log was read
+    best, settings = judgement.best, dict[str, Any]()
+    # a small zero is a phase
+    if judgement.alone and (best.family != AS_READ or max(map(abs, best.zero)) >= _SMALL):
+        settings = _settings(best.convention, origin)
+    if not settings and K4 not in judgement.as_read.names:  # said to be without weight
+        weighed = judgement.trials.reweighed()
+        better = weighed.score < best.score - judgement.trials.apart
+        if better and weighed.convincing and _has_weight(weighed):
+            best, settings = weighed, {"effort": "raw", "gravity": Model().gravity}
+    if not settings:  # without settings it is how the log was read
         return None
-    wrong = []
+    wrong, broken = [], judgement.as_read.broken
     for name, value in settings.items():
         channel, dot, key = name.partition(".")
         form = _WRONG[channel.rstrip("12") + dot + key]
@@ -140,9 +154,8 @@ def doubted(origin: Origin, judgement: Judgement | None) -> Notice | None:
     as_read, trials = judgement.as_read, judgement.trials
     if judgement.alone and judgement.best.convention == AS_READ:
         return None
-    k = as_read.constants
-    if math.hypot(k[K2], k[K4]) < _LEAST_PULL * abs(k[K3] + k[K5]):
-        weightless = trials.weightless()
+    if not _has_weight(as_read):
+        weightless = trials.reweighed()
         if weightless.convincing and weightless.left.max() < as_read.left.max() + _OF_WEIGHT:
             driver = Remedy({"effort": "gravity-compensated"}, "for such a driver")
             level = Remedy({"gravity": 0}, "for a horizontal plane")
@@ -164,8 +177,15 @@ def doubted(origin: Origin, judgement: Judgement | None) -> Notice | None:
     offered = tuple(Remedy(_settings(one.convention, origin)) for one in near)
     turn = near[0].zero[0]
     if turn in (0.0, pi):
-        return Notice("FLIPPED_SIGN", numbers={"weight": k[K4]}, remedies=offered)
+        weight = {"weight": as_read.constants[K4]}
+        return Notice("FLIPPED_SIGN", numbers=weight, remedies=offered)
     return Notice("WRONG_ZERO", numbers={"turn": -degrees(turn)}, remedies=offered)
+
+
+def _has_weight(one: Candidate) -> bool:
+    """True if gravity pulls as it does on links of their inertia."""
+    k = one.constants
+    return math.hypot(k[K2], k[K4]) >= _LEAST_PULL * abs(k[K3] + k[K5])
 
 
 def zeroed(origin: Origin, turn: float, half: float) -> Remedy:
@@ -206,15 +226,19 @@ def _exactly(convention: Convention, origin: Origin) -> dict[str, Any]:
             channel = reading.channels.get(name)
             # against the sign that the profile gives the channel, beside that of its joint
             settings[f"{name}.sign"] = -channel.sign * reading.signs[place] if channel else -1
-        units = [unit for one, unit in _UNITS.items() if isclose(scale, one)]
-        if units:
-            settings[f"theta{joint}.unit"] = units[0]
-        elif scale != 1:
-            settings[f"theta{joint}.gear_ratio"] = float(f"{scale:.6g}")
+        if scale != 1:
+            # against the unit, or the gear, by which the log was read
+            read = reading.channels.get(f"theta{joint}", ChannelReading("", "rad"))
+            units = [one for one in ANGLE if isclose(scale, UNIT_SCALES.get((read.unit, one), 0))]
+            geared = ANGLE.get(read.unit, abs(read.factor)) / abs(read.factor)
+            if units:
+                settings[f"theta{joint}.unit"] = units[0]
+            else:
+                settings[f"theta{joint}.gear_ratio"] = float(f"{geared * scale:.6g}")
     if convention.absolute:
-        settings["second_angle"] = "absolute"
+        settings["second_angle"] = "absolute" if convention.absolute > 0 else "relative"
     if convention.base:
-        settings["drive"] = "base"
+        settings["drive"] = "base" if convention.base > 0 else "joint"
     return settings | _zeros(convention, reading)
 
 
@@ -233,7 +257,7 @@ def _zeros(convention: Convention, reading: Reading, within: float = _SAME) -> d
     lefts = {name: remainder(first - turned, 2 * pi) for name, turned in ZEROS.items()}
     zero = min((reading.zero, *ZEROS), key=lambda name: abs(lefts[name]) > within)
     offset = lefts[zero] * (abs(lefts[zero]) > within)
-    added = np.array([offset, second + offset * (absolute or convention.absolute)]) - own
+    added = np.array([offset, second + offset * (absolute + convention.absolute)]) - own
     added = np.remainder(added + pi, 2 * pi) - pi
     added[np.abs(added) < _SAME] = 0.0
     offsets = [float(f"{one:.6g}") for one in reading.offsets + added]

@@ -29,7 +29,7 @@ from algid.notices import (
     of_codes,
     warnings_of,
 )
-from algid.options import flag
+from algid.options import SET, flag
 
 if TYPE_CHECKING:
     from algid.results.model import Estimate, Result, TorquePrediction
@@ -269,6 +269,16 @@ def again(result: Result, flags: Sequence[str]) -> str:
             if value != DEFAULTS[name] and name not in ("poles", *result.profile):
                 own[name] = value
         words += Remedy(own).flags
+    # one that was typed otherwise before is no longer said
+    for typed, value in zip(flags[::2], flags[1::2], strict=True):
+        key = value.partition("=")[0] + "=" if typed == SET.strip() else ""
+        places = [
+            at
+            for at, word in enumerate(words[:-1])
+            if word == typed and words[at + 1].startswith(key)
+        ]
+        for at in reversed(places):
+            del words[at : at + 2]
     words += flags
     if flag("force") not in words:
         words.append(flag("force"))

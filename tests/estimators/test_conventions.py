@@ -223,9 +223,10 @@ def test_no_convention_that_is_passed_over_comes_nearer(bench: Bench, row: str) 
         tau = np.random.default_rng(2).standard_normal(tau.shape)
     else:
         theta, tau = spoiled(row, theta, tau)
-    trials = Trials([Recorded(theta, tau, DT)], True)
+    log = Recorded(theta, tau, DT)
+    trials = Trials([log], True)
     looked_at = trials.unscaled()
-    every = [trials.under(one, *_TURNS) for families in _families() for one in families]
+    every = [trials.under(one, *_TURNS) for families in _families(log) for one in families]
     best = min((one.score for one in looked_at if not one.broken), default=np.inf)
     seen = {one.convention for one in looked_at}
     for one in (one for own in every for one in own if not one.broken):

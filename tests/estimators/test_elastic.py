@@ -85,7 +85,7 @@ def test_what_a_coefficient_turns_the_links_by_is_a_difference(
 
 def test_a_lag_that_the_last_round_would_find_leaves_the_choice_whole() -> None:
     _, motion = conventions.motion_of("arm22")
-    swapped = conventions.log_of(motion, conventions.SPOILS["joints swapped"], friction=1)
+    swapped = conventions.log_of(motion, "joints swapped", friction=1)
     result = identify(swapped, report=False)
     assert result.verdict.failed
     assert "WRONG_CONVENTION" in {one.code for one in result.notices}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -105,6 +106,17 @@ def test_an_unloaded_arm_without_weight_may_lie_or_be_compensated() -> None:
     flags = [remedy.flags for remedy in notice.remedies]
     assert flags == [("--effort", "gravity-compensated"), ("--gravity", "0")]
     right(result, "k1 k3 k5 k6 k7")
+
+
+@pytest.mark.parametrize("said", [{"effort": "gravity-compensated"}, {"gravity": 0.0}])
+def test_weight_that_is_said_not_to_be_there_is_named(said: dict[str, Any]) -> None:
+    log = logs("raw")[0]
+    found = identify(log, report=False, **said)
+    assert found.verdict.failed
+    assert "weight" in found.verdict.reasons[0].text
+    remedy = found.verdict.reasons[0].remedy
+    assert remedy is not None
+    assert identify(log, report=False, **said | remedy.keywords).verdict.grade == "good"
 
 
 def test_a_payload_that_is_compensated_too_needs_a_length() -> None:

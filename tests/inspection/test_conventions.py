@@ -97,6 +97,11 @@ def test_the_settings_named_mend_the_log(row: str, kind: str, tmp_path: Path) ->
             {"signs": [-1, 1], "tau1": {"sign": -1}, "zero": "hanging", "offsets": [0.0, 3.0]},
         ),
         ("absolute, hanging", {"second_angle": "absolute", "offsets": [-0.4, -0.4]}),
+        ("right", {"second_angle": "absolute", "zero": "hanging"}),
+        ("right", {"drive": "base"}),
+        ("right", {"angle_unit": "rev"}),
+        ("right", {"angle_unit": "deg"}),
+        ("motor", {"theta1": {"gear_ratio": 50}}),
     ],
 )
 def test_settings_change_what_a_profile_said(

@@ -119,7 +119,7 @@ def judgement(
     """What a log may say: that `convention` is the right one, and what the one that it was read by
     breaks.
     """
-    as_read = SimpleNamespace(broken=broken or {}, left=np.array([0.123, 0.456]))
+    as_read = SimpleNamespace(broken=broken or {}, left=np.array([0.123, 0.456]), names=("k4",))
     return SimpleNamespace(
         as_read=as_read,
         best=SimpleNamespace(
@@ -172,17 +172,13 @@ TORQUES_SWAPPED = '--set tau1.source="tau2" --set tau2.source="tau1"'
             "the angles of the joints are swapped",
             '--set theta1.source="theta2" --set theta2.source="theta1"',
         ),
-        (
-            Convention(absolute=True),
-            "θ2 counts from the horizontal or the vertical, not from link 1",
-            "--second-angle absolute",
-        ),
-        (Convention(base=True), "the second motor stands at the base", "--set drive=base"),
+        (Convention(absolute=1), "θ2 is absolute", "--second-angle absolute"),
+        (Convention(base=1), "the second motor stands at the base", "--set drive=base"),
         (Convention(scale=(DEGREES, 1.0)), "θ1 is in deg", "--set theta1.unit=deg"),
         (Convention(scale=(1.0, 1 / (2 * math.pi))), "θ2 is in rev", "--set theta2.unit=rev"),
         (
             Convention(scale=(1.0, 7.00001)),
-            "θ2 is the motor's angle, 7 times the joint's",
+            "θ2 counts 7 times the joint's angle",
             "--set theta2.gear_ratio=7.00001",
         ),
         (Convention(zero=(-HALF, 0.0)), "θ1 is zero where link 1 is hanging", "--zero hanging"),
@@ -208,10 +204,10 @@ def test_what_is_wrong_is_said_in_words_and_in_flags(
 
 def test_what_contradicts_is_the_worst_that_is_broken() -> None:
     broken = {"k1 > 0": -5.4, "k3 > 0": -60.2, "k5 > 0": -7.0}
-    found = mend(read_by(), judgement(Convention(base=True), broken=broken))
+    found = mend(read_by(), judgement(Convention(base=1), broken=broken))
     assert found is not None
     assert found.numbers["contradiction"] == "k3 > 0 is broken by 60 σ"
-    unexplained = mended(Convention(base=True)).numbers["contradiction"]
+    unexplained = mended(Convention(base=1)).numbers["contradiction"]
     assert unexplained == "45.6 % of a torque stays unexplained, 1.2 % otherwise"
 
 

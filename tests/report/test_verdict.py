@@ -249,6 +249,11 @@ TYPED = "algid identify 'a b.csv' -o out"
         (HANGING, {"settings": {"command": TYPED}}, f"{TYPED} --zero hanging --force"),
         (HANGING, {"settings": {"command": f"{TYPED} --force"}}, f"{TYPED} --force --zero hanging"),
         (HANGING, {"profile": {"zero": "hanging"}}, None),  # said already
+        (
+            HANGING,
+            {"settings": {"command": f"{TYPED} --zero upright --set tau1.sign=1"}},
+            f"{TYPED} --set tau1.sign=1 --zero hanging --force",
+        ),
         (OTHERS, {}, None),
         (replace(HANGING, remedies=(Remedy({"accept": "WRONG_ZERO"}),)), {}, None),
         (
