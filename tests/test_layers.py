@@ -62,7 +62,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "google h5py lz4 mcap numpy polars pyarrow rosbags ruamel scipy zstandard",
     ),
     "inspection": room("arm criteria errors estimators faults log model notices profile "
-                       "quantiles readers signals", "numpy pydantic_core"),
+                       "quantiles readers signals units", "numpy pydantic_core"),
     "report": room(
         "arm arrow blocks criteria errors files inspection methods model notices options "
         "progress quantiles results ros2 significance text",

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import permutations, product
+from itertools import product
 from math import copysign, pi, remainder
 from operator import itemgetter
 
@@ -23,7 +23,6 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.base.names import evenly_spread, outside, vector
 from algid.base.significance import SURE
-from algid.base.units import ANGLE
 from algid.estimators.convention_sums import (
     COLUMNS,
     WINDOW,
@@ -53,10 +52,8 @@ _MOST_GRIDS = 100
 _GRID = np.array(list(product((0.0, -0.5, 0.5, -1.0, 1.0), repeat=2)))  # its middle first
 _SCALES = (0.0025, 400.0)  # from angles read in degrees that are in turns to large gears' motors
 _WIDEST = 40.0  # rad: no scale is tried under which a joint would move further
-UNIT_SCALES = {(read, true): ANGLE[read] / ANGLE[true] for read, true in permutations(ANGLE, 2)}
-"""Of angles that were read in one unit and are in another."""
-_EXACT = (*UNIT_SCALES.values(), *(gear**way for gear in range(2, 401) for way in (1, -1)))
-"""Scales of their own right: of units, and of whole gears and their inverses."""
+_EXACT = [gear**way for gear in range(2, 401) for way in (1, -1)]
+"""Scales of their own right: whole gears and their inverses."""
 _NEAR = 0.01  # of a scale: how near one of those it is tried for them
 
 _NEXT_TO_AXIS, _LONG = 0.02, 1.5
@@ -192,6 +189,7 @@ class Recorded:
 
     The joint `passive` (1 or 2) has no motor. `absolute` and `base` are what a convention has where
     the reference of θ2 or the second motor's place is wrong: -1 where the log was read by them.
+    `unit_scales` divide angles that are in another unit than the one they were read in.
     """
 
     theta: FloatArray
@@ -200,6 +198,7 @@ class Recorded:
     passive: int | None = None
     absolute: int = 1
     base: int = 1
+    unit_scales: Sequence[float] = ()
 
     @property
     def usable(self) -> bool:
@@ -424,10 +423,13 @@ class Trials:
             around = [scale / step, scale / step**0.5, scale, scale * step**0.5, scale * step]
             scale = min(around, key=lambda scale: score(scale, self._fine))
             step = step**0.5
+        # a unit before a gear: what rubs leaves the scale open by a few per cent
+        likely = [one for one in self._read.unit_scales if 0.5 < one / scale < 2]
         nearest = min(_EXACT, key=lambda whole: abs(scale / whole - 1))
-        near = abs(scale / nearest - 1) < _NEAR
-        if near and score(nearest, self._fine) < score(scale, self._fine) + self.apart:
-            scale = nearest
+        if abs(scale / nearest - 1) < _NEAR:
+            likely.append(nearest)
+        least = score(scale, self._fine) + self.apart
+        scale = next((one for one in likely if score(one, self._fine) < least), scale)
         return _scaled_by(scale, joints)
 
     def _place(self, zero: tuple[float, float]) -> FloatArray:

@@ -18,7 +18,6 @@ from algid.base.units import ANGLE
 from algid.estimators.convention_search import (
     MET,
     MOST_LOGS,
-    UNIT_SCALES,
     Candidate,
     Judgement,
     Recorded,
@@ -33,6 +32,7 @@ from algid.signals.segments import stretches
 # rad: a zero this close, or a centre of mass off its link, is a phase and no other convention
 _SMALL = np.pi / 4
 _SAME = 1e-3  # of a scale or rad: as good as equal
+PLAIN = ChannelReading("", "rad")
 _WRONG = {
     "joints": "the joints are swapped",
     "theta.source": "the angles of the joints are swapped",
@@ -72,16 +72,17 @@ def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
 def recorded(log: Log, seconds: float = math.inf) -> list[Recorded]:
     """The stretches of a log without a gap, the longest first, `seconds` of them in all."""
     parts, reading = [], log.origin.reading
-    # what was said of θ2 and of the second motor may be wrong
-    way = (
-        reading.passive,
-        -1 if reading.second_angle == "absolute" else 1,
-        -1 if reading.drive == "base" else 1,
-    )
+    # what was said of θ2, of the second motor and of units may be wrong
+    way: dict[str, Any] = {
+        "passive": reading.passive,
+        "absolute": -1 if reading.second_angle == "absolute" else 1,
+        "base": -1 if reading.drive == "base" else 1,
+        "unit_scales": tuple(_unit_scales(reading, 1).values()),
+    }
     for stretch in sorted(stretches([log]), key=len, reverse=True)[:MOST_LOGS]:
         part = stretch.part(0, int(min(len(stretch), seconds / stretch.dt)))
         seconds -= len(part) * part.dt
-        parts.append(Recorded(part.theta.copy(), part.tau.copy(), part.dt, *way))
+        parts.append(Recorded(part.theta.copy(), part.tau.copy(), part.dt, **way))
     return parts
 
 
@@ -194,6 +195,14 @@ def zeroed(origin: Origin, turn: float, half: float) -> Remedy:
     return Remedy(_zeros(convention, origin.reading, half))
 
 
+def _unit_scales(reading: Reading, joint: int) -> dict[str, float]:
+    """By unit what divides angles that are in it, not in the one by which they were read."""
+    known = reading.channels.get(f"theta{joint}", PLAIN).unit
+    if known not in ANGLE:
+        return {}
+    return {unit: ANGLE[known] / factor for unit, factor in ANGLE.items() if unit != known}
+
+
 def _settings(convention: Convention, origin: Origin) -> dict[str, Any]:
     """The settings that read a log by `convention`, or by the same arm seen from behind.
 
@@ -226,15 +235,13 @@ def _exactly(convention: Convention, origin: Origin) -> dict[str, Any]:
             channel = reading.channels.get(name)
             # against the sign that the profile gives the channel, beside that of its joint
             settings[f"{name}.sign"] = -channel.sign * reading.signs[place] if channel else -1
-        if scale != 1:
-            # against the unit, or the gear, by which the log was read
-            read = reading.channels.get(f"theta{joint}", ChannelReading("", "rad"))
-            units = [one for one in ANGLE if isclose(scale, UNIT_SCALES.get((read.unit, one), 0))]
+        units = _unit_scales(reading, joint)
+        if unit := next((one for one in units if isclose(scale, units[one])), None):
+            settings[f"theta{joint}.unit"] = unit
+        elif scale != 1:
+            read = reading.channels.get(f"theta{joint}", PLAIN)
             geared = ANGLE.get(read.unit, abs(read.factor)) / abs(read.factor)
-            if units:
-                settings[f"theta{joint}.unit"] = units[0]
-            else:
-                settings[f"theta{joint}.gear_ratio"] = float(f"{geared * scale:.6g}")
+            settings[f"theta{joint}.gear_ratio"] = float(f"{geared * scale:.6g}")
     if convention.absolute:
         settings["second_angle"] = "absolute" if convention.absolute > 0 else "relative"
     if convention.base:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -58,6 +59,14 @@ EVERY: dict[str, Spoil] = {
 }
 
 
+READ: dict[str, tuple[Any, ...]] = {
+    "said to be absolute": (-1, 1),
+    "said to be driven from the base": (1, -1),
+    "said to be in degrees": (1, 1, [np.pi / 180]),
+}
+"""By what such a log was read: `absolute`, `base` and `unit_scales` of `Recorded`."""
+
+
 def spoiled(name: str, theta: FloatArray, tau: FloatArray) -> Pair:
     a, b, s, t = EVERY[name](*theta, *tau)
     return np.stack([a, b]), np.stack([s, t])
@@ -67,7 +76,8 @@ def spoiled(name: str, theta: FloatArray, tau: FloatArray) -> Pair:
 def test_the_convention_that_is_named_undoes_the_mistake(bench: Bench, row: str) -> None:
     theta, tau = measured(bench.bare)
     wrong = spoiled(row, theta, tau)
-    found = judged(*wrong)
+    found = judge_together([Recorded(*wrong, DT, None, *READ.get(row, ()))])
+    assert found is not None
     assert found.alone
     assert found.best.convention != AS_READ
     mends = [found.best.convention, found.best.convention.mirrored()]
