@@ -235,10 +235,7 @@ def test_the_campaign_can_be_rehearsed(folder: Path, tmp_path: Path) -> None:
 REFUSED = [
     (["case1", *SENSORS, "--speed", "3", "--torque", "2"], "--range: it must be given"),
     (["case1", *LIMITS], "--position-noise: case1 does not tell"),
-    (["case1", *SENSORS, *LIMITS, "--range", "x"], "--range: expected rad like 1.2"),
     (["case1", *SENSORS, *LIMITS, "--range=-60:60,-60:60"], "from 1e-06 to 6.283, or inf"),
-    (["case1", *SENSORS, *LIMITS, "--range", "1:-1,0:1"], "or LOW:HIGH of each joint like"),
-    (["case1", *SENSORS, *LIMITS, "--speed=-3"], "--speed: expected rad/s"),
     (
         ["case1", *SENSORS, *LIMITS, "--range=-0.2:0.2,-0.1:0.1", "--torque", "0.2,0.2"],
         "--torque: even at rest, wherever within --range, torque, loaded of joint 1",
@@ -251,13 +248,8 @@ REFUSED = [
         ["case1", *SENSORS, *LIMITS, "--set", "tip_height=5"],
         "--set tip_height: expected less than the arm's reach",
     ),
-    (
-        ["case1", *SENSORS, *LIMITS, "--torque", "1.9,0"],
-        "--torque: expected N m like 5 or 5,2",
-    ),
     (["case1", *SENSORS, *LIMITS, "--for", "k9"], "--for k9: expected some of k1"),
     (["case1", *SENSORS, *LIMITS, "--runs", "1,0", "--for", "m_p"], "there are no loaded runs"),
-    (["case1", *SENSORS, *LIMITS, "--runs", "0,0"], "--runs: expected numbers of runs"),
     (["case1", *SENSORS, *LIMITS, "--joints", "one"], "expected two names like shoulder,elbow"),
     (["nocase", *SENSORS, *LIMITS], "no such case"),
 ]

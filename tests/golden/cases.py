@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -71,50 +71,34 @@ def summary(result: algid.Result) -> Summary:
     return found
 
 
-def _identified(**settings: Any) -> Callable[[Path], Summary]:
-    def run(_folder: Path) -> Summary:
-        return summary(algid.identify(*logs("case1"), algid.Settings(**settings), report=False))
-
-    return run
+def _identified(_folder: Path, **settings: Any) -> Summary:
+    return summary(algid.identify(*logs("case1"), algid.Settings(**settings), report=False))
 
 
-def _of_case(name: str, estimator: str, exact: bool) -> Callable[[Path], Summary]:
-    def run(_folder: Path) -> Summary:
-        settings = algid.Settings(estimator=estimator)
-        return summary(algid.identify(*logs(name, exact=exact), settings, report=False))
-
-    return run
+def _of_case(name: str, estimator: str, exact: bool, _folder: Path) -> Summary:
+    settings = algid.Settings(estimator=estimator)
+    return summary(algid.identify(*logs(name, exact=exact), settings, report=False))
 
 
-def _changed(change: Callable[[Log], Log]) -> Callable[[Path], Summary]:
+def _changed(change: Callable[[Log], Log], _folder: Path) -> Summary:
     """The unloaded log of case 1 with something wrong with it."""
-
-    def run(_folder: Path) -> Summary:
-        try:
-            return summary(algid.identify(change(logs("case1")[0]), report=False))
-        except algid.AlgidError as error:
-            return {"refused": type(error).__name__}
-
-    return run
+    try:
+        return summary(algid.identify(change(logs("case1")[0]), report=False))
+    except algid.AlgidError as error:
+        return {"refused": type(error).__name__}
 
 
-def _scaled(**factors: float) -> Callable[[Log], Log]:
-    def change(log: Log) -> Log:
-        theta, tau = log.theta.copy(), log.tau.copy()
-        for name, factor in factors.items():
-            (theta if name.startswith("theta") else tau)[int(name[-1]) - 1] *= factor
-        return replace(log, theta=theta, tau=tau)
-
-    return change
+def _scaled(log: Log, **factors: float) -> Log:
+    theta, tau = log.theta.copy(), log.tau.copy()
+    for name, factor in factors.items():
+        (theta if name.startswith("theta") else tau)[int(name[-1]) - 1] *= factor
+    return replace(log, theta=theta, tau=tau)
 
 
-def _shifted(joint: int, angle: float) -> Callable[[Log], Log]:
-    def change(log: Log) -> Log:
-        theta = log.theta.copy()
-        theta[joint] += angle
-        return replace(log, theta=theta)
-
-    return change
+def _shifted(joint: int, angle: float, log: Log) -> Log:
+    theta = log.theta.copy()
+    theta[joint] += angle
+    return replace(log, theta=theta)
 
 
 def _swapped(log: Log) -> Log:
@@ -131,36 +115,25 @@ def _still(log: Log) -> Log:
     return replace(log, theta=theta, tau=tau)
 
 
-def _read_back(suffix: str) -> Callable[[Path], Summary]:
-    def run(folder: Path) -> Summary:
-        paths = []
-        for place, log in enumerate(logs("case1", 2.0)):
-            paths.append(folder / f"log{place}{suffix}")
-            algid.write_log(paths[-1], log)
-        return summary(algid.identify(paths[0], paths[1], report=False))
-
-    return run
+def _read_back(suffix: str, folder: Path) -> Summary:
+    paths = []
+    for place, log in enumerate(logs("case1", 2.0)):
+        paths.append(folder / f"log{place}{suffix}")
+        algid.write_log(paths[-1], log)
+    return summary(algid.identify(paths[0], paths[1], report=False))
 
 
-def _several(count: int, **settings: Any) -> Callable[[Path], Summary]:
-    def run(_folder: Path) -> Summary:
-        unloaded = [
-            algid.synthesise(
-                "case2", duration=2.0, torque="wide", sensors=replace(NOISY, seed=seed)
-            )[0]
-            for seed in range(count)
-        ]
-        return summary(algid.identify(unloaded, settings=algid.Settings(**settings), report=False))
-
-    return run
+def _several(count: int, _folder: Path, **settings: Any) -> Summary:
+    unloaded = [
+        algid.synthesise("case2", duration=2.0, torque="wide", sensors=replace(NOISY, seed=seed))[0]
+        for seed in range(count)
+    ]
+    return summary(algid.identify(unloaded, settings=algid.Settings(**settings), report=False))
 
 
-def _scene(name: str) -> Callable[[Path], Summary]:
-    def run(_folder: Path) -> Summary:
-        unloaded, loaded = SCENES[name]()
-        return summary(algid.identify(unloaded, loaded or None, report=False))
-
-    return run
+def _scene(name: str, _folder: Path) -> Summary:
+    unloaded, loaded = SCENES[name]()
+    return summary(algid.identify(unloaded, loaded or None, report=False))
 
 
 def _known_arm(_folder: Path) -> Summary:
@@ -169,35 +142,27 @@ def _known_arm(_folder: Path) -> Summary:
     return summary(algid.identify(None, loaded, parameters=arm, report=False))
 
 
-def _exported(form: str) -> Callable[[Path], Summary]:
-    def run(folder: Path) -> Summary:
-        unloaded, loaded = logs("case1")
-        algid.identify(unloaded, loaded, out=folder, name="arm", report=False)
-        done = Outcome("export", folder / "arm.algid", "--to", form, "-o", folder / "model")
-        files = sorted(folder.glob("model*"))
-        text = "".join(path.read_text(encoding="utf-8") for path in files)
-        numbers = re.findall(r"(?<![\w.])-?\d+\.\d+(?:e[+-]?\d+)?", text)
-        return {
-            "code": done.code,
-            "numbers": {str(n): [float(value), None] for n, value in enumerate(numbers)},
-        }
-
-    return run
+def _exported(form: str, folder: Path) -> Summary:
+    unloaded, loaded = logs("case1")
+    algid.identify(unloaded, loaded, out=folder, name="arm", report=False)
+    done = Outcome("export", folder / "arm.algid", "--to", form, "-o", folder / "model")
+    files = sorted(folder.glob("model*"))
+    text = "".join(path.read_text(encoding="utf-8") for path in files)
+    numbers = re.findall(r"(?<![\w.])-?\d+\.\d+(?:e[+-]?\d+)?", text)
+    return {
+        "code": done.code,
+        "numbers": {str(n): [float(value), None] for n, value in enumerate(numbers)},
+    }
 
 
-def _real(folder: str, places: slice, **settings: Any) -> Callable[[Path], Summary]:
-    def run(_folder: Path) -> Summary:
-        from algid.profile import Profile
+def _real(folder: str, places: slice, _folder: Path, **settings: Any) -> Summary:
+    from algid.profile import Profile
 
-        paths = sorted((SHARED / folder).glob("*.csv"))[places]
-        profile = Profile.model_validate({"zero": "hanging"})
-        return summary(
-            algid.identify(
-                paths, settings=algid.Settings(**settings), profile=profile, report=False
-            )
-        )
-
-    return run
+    paths = sorted((SHARED / folder).glob("*.csv"))[places]
+    profile = Profile.model_validate({"zero": "hanging"})
+    return summary(
+        algid.identify(paths, settings=algid.Settings(**settings), profile=profile, report=False)
+    )
 
 
 def cases() -> Iterator[Case]:
@@ -206,7 +171,7 @@ def cases() -> Iterator[Case]:
         for estimator in ("refined", "weak", "instruments", "paper"):
             for exact in (False, True):
                 label = f"{name} {estimator}{' exact' if exact else ''}"
-                yield Case(label, _of_case(name, estimator, exact))
+                yield Case(label, partial(_of_case, name, estimator, exact))
     for term in (
         "coulomb",
         "offset",
@@ -218,8 +183,8 @@ def cases() -> Iterator[Case]:
         "coulomb,stribeck",
         "coulomb,asymmetry",
     ):
-        yield Case(f"model {term}", _identified(model=term))
-        yield Case(f"weak model {term}", _identified(model=term, estimator="weak"))
+        yield Case(f"model {term}", partial(_identified, model=term))
+        yield Case(f"weak model {term}", partial(_identified, model=term, estimator="weak"))
     more: dict[str, dict[str, Any]] = {
         "plain": {"model": "plain"},
         "held torque": {"torque_hold": "zoh"},
@@ -230,32 +195,32 @@ def cases() -> Iterator[Case]:
         "short windows": {"estimator": "weak", "window": 0.2},
     }
     for label, settings in more.items():
-        yield Case(label, _identified(**settings))
+        yield Case(label, partial(_identified, **settings))
     wrong: dict[str, Callable[[Log], Log]] = {
-        "flipped torque": _scaled(tau1=-1.0),
-        "mirrored": _scaled(theta1=-1.0, theta2=-1.0, tau1=-1.0, tau2=-1.0),
-        "gain": _scaled(tau1=0.8),
-        "hanging zero": _shifted(0, np.pi / 2),
-        "zero of joint 2": _shifted(1, 0.1),
+        "flipped torque": partial(_scaled, tau1=-1.0),
+        "mirrored": partial(_scaled, theta1=-1.0, theta2=-1.0, tau1=-1.0, tau2=-1.0),
+        "gain": partial(_scaled, tau1=0.8),
+        "hanging zero": partial(_shifted, 0, np.pi / 2),
+        "zero of joint 2": partial(_shifted, 1, 0.1),
         "joints swapped": _swapped,
         "torque late": _late,
         "joint 2 still": _still,
     }
     for label, change in wrong.items():
-        yield Case(label, _changed(change))
+        yield Case(label, partial(_changed, change))
     for name in SCENES:
-        yield Case(f"scene {name}", _scene(name))
+        yield Case(f"scene {name}", partial(_scene, name))
     for suffix in (".csv", ".parquet", ".mcap"):
-        yield Case(f"read {suffix}", _read_back(suffix))
+        yield Case(f"read {suffix}", partial(_read_back, suffix))
     for estimator in ("refined", "weak"):
-        yield Case(f"five logs {estimator}", _several(5, estimator=estimator))
-    yield Case("cross-validated", _several(3, cross_validate=True, estimator="weak"))
+        yield Case(f"five logs {estimator}", partial(_several, 5, estimator=estimator))
+    yield Case("cross-validated", partial(_several, 3, cross_validate=True, estimator="weak"))
     yield Case("known arm", _known_arm)
     for form in ("urdf", "mjcf", "sdf", "python", "c", "payload"):
-        yield Case(f"export {form}", _exported(form))
+        yield Case(f"export {form}", partial(_exported, form))
     for sound in sounds():
         yield Case(f"file {sound.name}", sound.read)
-    yield Case("C.1, one run", _real("dfki/C1_sysid", slice(2, 3)), real=True)
-    yield Case("C.1, three runs", _real("dfki/C1_sysid", slice(0, 3)), real=True)
-    yield Case("A.0, two runs", _real("dfki/A0_sysid", slice(0, 2)), real=True)
-    yield Case("A.0, plain", _real("dfki/A0_sysid", slice(0, 2), model="plain"), real=True)
+    yield Case("C.1, one run", partial(_real, "dfki/C1_sysid", slice(2, 3)), real=True)
+    yield Case("C.1, three runs", partial(_real, "dfki/C1_sysid", slice(0, 3)), real=True)
+    yield Case("A.0, two runs", partial(_real, "dfki/A0_sysid", slice(0, 2)), real=True)
+    yield Case("A.0, plain", partial(_real, "dfki/A0_sysid", slice(0, 2), model="plain"), real=True)

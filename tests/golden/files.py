@@ -8,6 +8,7 @@ import sqlite3
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -96,27 +97,19 @@ def table(seconds: bool = True) -> dict[str, Any]:
 # the formats that algid writes
 
 
-def _written(kind: str, start_ns: int, velocity: bool, truth: bool) -> Callable[[Path], Made]:
-    def make(folder: Path) -> Path:
-        path = folder / f"log.{kind}"
-        write_log(path, log(start_ns, velocity), truth=TRUTH if truth else None)
-        return path
-
-    return make
+def _written(kind: str, start_ns: int, whole: bool, folder: Path) -> Path:
+    path = folder / f"log.{kind}"
+    write_log(path, log(start_ns, whole), truth=TRUTH if whole else None)
+    return path
 
 
 # tables of text
 
 
-def _text(*lines: str, name: str = "log.csv", **settings: Any) -> Callable[[Path], Made]:
+def _text(*lines: str, **settings: Any) -> Callable[[Path], Made]:
     """A table of some lines, in bytes of UTF-8 with line feeds."""
-
-    def make(folder: Path) -> Made:
-        path = folder / name
-        path.write_bytes("\n".join(lines).encode() + b"\n")
-        return path, settings
-
-    return make
+    write = partial(_of_bytes, "log.csv", "\n".join([*lines, ""]).encode())
+    return lambda folder: (write(folder), settings)
 
 
 def rows(separator: str = ",", form: str = "{}", first: Iterable[Any] | None = None) -> list[str]:
@@ -130,12 +123,9 @@ HEAD = "t,theta1,theta2,tau1,tau2"
 DATES = [f"2024-05-06T07:08:{1 + row // 1000:02d}.{row % 1000:03d}" for row in range(ROWS)]
 
 
-def _of_bytes(name: str, content: bytes) -> Callable[[Path], Made]:
-    def make(folder: Path) -> Path:
-        (folder / name).write_bytes(content)
-        return folder / name
-
-    return make
+def _of_bytes(name: str, content: bytes, folder: Path) -> Path:
+    (folder / name).write_bytes(content)
+    return folder / name
 
 
 def texts() -> dict[str, Callable[[Path], Made]]:
@@ -148,17 +138,19 @@ def texts() -> dict[str, Callable[[Path], Made]]:
     gaps[9] = ",,,,"
     milliseconds = rows(first=(STAMPS * 1e-6).tolist())
     return {
-        "plain": _of_bytes("log.csv", plain),
-        "gzip": _of_bytes("log.csv.gz", gzip.compress(plain)),
-        "gzip, two members": _of_bytes(
-            "log.csv.gz", gzip.compress(plain[:5000]) + gzip.compress(plain[5000:])
+        "plain": partial(_of_bytes, "log.csv", plain),
+        "gzip": partial(_of_bytes, "log.csv.gz", gzip.compress(plain)),
+        "gzip, two members": partial(
+            _of_bytes, "log.csv.gz", gzip.compress(plain[:5000]) + gzip.compress(plain[5000:])
         ),
-        "zstd": _of_bytes("log.csv.zst", zstandard.compress(plain)),
-        "zstd, two frames": _of_bytes(
-            "log.csv.zst", zstandard.compress(plain[:5000]) + zstandard.compress(plain[5000:])
+        "zstd": partial(_of_bytes, "log.csv.zst", zstandard.compress(plain)),
+        "zstd, two frames": partial(
+            _of_bytes,
+            "log.csv.zst",
+            zstandard.compress(plain[:5000]) + zstandard.compress(plain[5000:]),
         ),
-        "byte order mark, CRLF": _of_bytes(
-            "log.csv", b"\xef\xbb\xbf" + plain.replace(b"\n", b"\r\n")
+        "byte order mark, CRLF": partial(
+            _of_bytes, "log.csv", b"\xef\xbb\xbf" + plain.replace(b"\n", b"\r\n")
         ),
         "semicolons": _text(HEAD.replace(",", ";"), *rows(";")),
         "decimal commas": _text(HEAD.replace(",", ";"), *comma),
@@ -196,7 +188,7 @@ def texts() -> dict[str, Callable[[Path], Made]]:
             "theta1,theta2,tau1,tau2", *(line.partition(",")[2] for line in rows()), rate=500
         ),
         "exponents": _text(HEAD, *rows(form="{:.17e}")),
-        "without its last line end": _of_bytes("log.csv", plain[:-1]),
+        "without its last line end": partial(_of_bytes, "log.csv", plain[:-1]),
         "joints 3 and 5 of six": _text(
             "t," + ",".join(f"q{n},tau{n}" for n in range(1, 7)),
             *(
@@ -239,12 +231,9 @@ def clocks() -> dict[str, Callable[[Path], Made]]:
 # tables of libraries
 
 
-def _arrow(columns: dict[str, Any], suffix: str = "parquet", **options: Any) -> Callable[..., Made]:
-    def make(folder: Path) -> Path:
-        arrow = columns if isinstance(columns, pa.Table) else pa.table(columns)
-        return store_table(folder / f"log.{suffix}", arrow, **options)
-
-    return make
+def _arrow(columns: Any, suffix: str, folder: Path, **options: Any) -> Path:
+    arrow = columns if isinstance(columns, pa.Table) else pa.table(columns)
+    return store_table(folder / f"log.{suffix}", arrow, **options)
 
 
 def arrow_tables() -> dict[str, Any]:
@@ -530,20 +519,24 @@ def bags() -> dict[str, Callable[[Path], Made]]:
 
 def sounds() -> list[Sound]:
     """Every kind of sound file."""
-    found = {}
+    found: dict[str, Callable[[Path], Made]] = {}
     for kind in FORMATS:
-        found[f"{kind} of algid"] = _written(kind, 0, velocity=False, truth=False)
-        found[f"{kind} of algid, truth"] = _written(kind, EPOCH_NS, velocity=True, truth=True)
+        found[f"{kind} of algid"] = partial(_written, kind, 0, False)
+        found[f"{kind} of algid, truth"] = partial(_written, kind, EPOCH_NS, True)
     found |= {f"CSV: {name}": make for name, make in texts().items()}
     found |= {f"clock: {name}": make for name, make in clocks().items()}
     for name, columns in arrow_tables().items():
-        found[f"Parquet: {name}"] = _arrow(columns)
-        found[f"Feather: {name}"] = _arrow(columns, "feather")
+        found[f"Parquet: {name}"] = partial(_arrow, columns, "parquet")
+        found[f"Feather: {name}"] = partial(_arrow, columns, "feather")
     options: dict[str, Any] = {"write_page_checksum": True, "row_group_size": 77}
-    found["Parquet: pages with checksums"] = _arrow(table(), **options)
-    found["Parquet: zstd"] = _arrow(table(), compression="zstd", use_dictionary=False)
-    found["Feather: zstd in chunks"] = _arrow(table(), "feather", compression="zstd", chunksize=50)
-    found["Feather: bare"] = _arrow(table(), "feather", compression="uncompressed")
+    found["Parquet: pages with checksums"] = partial(_arrow, table(), "parquet", **options)
+    found["Parquet: zstd"] = partial(
+        _arrow, table(), "parquet", compression="zstd", use_dictionary=False
+    )
+    found["Feather: zstd in chunks"] = partial(
+        _arrow, table(), "feather", compression="zstd", chunksize=50
+    )
+    found["Feather: bare"] = partial(_arrow, table(), "feather", compression="uncompressed")
     found |= arrays()
     found |= {f"JSON lines: {name}": make for name, make in json_lines().items()}
     found |= {f"MCAP: {name}": make for name, make in mcaps().items()}

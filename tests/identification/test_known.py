@@ -4,7 +4,6 @@ propagation.
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 import algid
@@ -119,28 +118,3 @@ def test_lengths_that_far_off_contradict_the_result(weighed: Result) -> None:
     bare = weighed.model_copy(update={"payload": {}})
     assert contradictions(bare, {"l2": 9.0}) == ()  # the constants tell l1 alone
     assert len(contradictions(bare, {"l1": 9.0})) == 1
-
-
-def test_the_first_length_of_a_bent_arm_is_that_of_its_moments_sizes(weighed: Result) -> None:
-    """K1 = m2 l1 lc2 e^{iδ}, K2 = g m2 lc2 e^{iδ}: its error against that of draws from the
-    covariance.
-    """
-    names = [*weighed.fit.covariance_names, "k1s", "k2s"]
-    mean = {"k1": 0.08, "k2": 1.9, "k1s": 0.03, "k2s": 0.7}
-    n = len(names)
-    rng = np.random.default_rng(0)
-    places = [names.index(name) for name in mean]
-    root = 1e-3 * rng.standard_normal((4, 4))
-    covariance = np.zeros((n, n))
-    covariance[np.ix_(places, places)] = root @ root.T
-    k1 = weighed.parameters["k1"]
-    own = {name: k1.model_copy(update={"estimate": value}) for name, value in mean.items()}
-    fit = weighed.fit.model_copy(
-        update={"covariance_names": names, "covariance": covariance.tolist()}
-    )
-    bent = weighed.model_copy(update={"parameters": {**weighed.parameters, **own}, "fit": fit})
-    found = by_constants(bent)
-    draws = rng.multivariate_normal(list(mean.values()), root @ root.T, 20_000).T
-    lengths = 9.81 * np.abs(draws[0] + 1j * draws[2]) / np.abs(draws[1] + 1j * draws[3])
-    assert found[0] == pytest.approx(9.81 * abs(0.08 + 0.03j) / abs(1.9 + 0.7j))
-    assert found[1] == pytest.approx(lengths.std(), rel=0.05)

@@ -9,26 +9,11 @@ import pytest
 from click.testing import CliRunner
 
 from algid.identification.identify import identify
-from algid.profile import Profile
 from algid.results import read_result
 from algid.settings import Settings
 from algid.writers import write_log
 from tests.cli.commands import app
 from tests.inspection.test_checks import moving_log
-
-
-def test_a_cut_that_was_asked_for_is_a_note_and_no_warning(tmp_path: Path) -> None:
-    write_log(tmp_path / "one.csv", moving_log(4000))
-    result = identify(
-        tmp_path / "one.csv",
-        settings=Settings(estimator="weak"),
-        profile=Profile(start=1),
-        report=False,
-    )
-    assert result.warnings == []
-    note = next(note for note in result.notes if "left out" in note)
-    assert "1,000 samples before 1 s" in note
-    assert result.log.duration == pytest.approx(2.999)
 
 
 def test_one_log_as_unloaded_and_as_loaded_is_told_in_one_line(tmp_path: Path) -> None:
@@ -68,11 +53,3 @@ def test_gravity_flag_over_profile_over_default(
     more = ["--estimator", "weak", "--model", "plain", "--no-report", "-q", *flags]
     CliRunner().invoke(app, [*command, *more])
     assert read_result(tmp_path / "one.algid").settings["gravity"] == expected
-
-
-def test_gravity_without_a_word_is_the_earths(tmp_path: Path) -> None:
-    write_log(tmp_path / "one.csv", moving_log(4000))
-    for profile, expected in ((None, 9.81), (Profile(start=0.5), 9.81), (Profile(gravity=0), 0.0)):
-        settings = Settings(estimator="weak", model="plain")
-        result = identify(tmp_path / "one.csv", settings=settings, profile=profile, report=False)
-        assert result.settings["gravity"] == expected

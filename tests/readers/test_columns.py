@@ -112,25 +112,6 @@ def test_a_joint_without_motor_needs_no_torque(passive: int) -> None:
     )
 
 
-def test_who_said_which_joint_is_the_first() -> None:
-    sources: dict[str, Any] = {
-        name: {"source": own}
-        for name, own in zip(("theta1", "theta2", "tau1", "tau2"), PLAIN.split()[1:], strict=True)
-    }
-    named = "t wrist_pos elbow_pos wrist_torque elbow_torque"
-    found = assigned(named)
-    reading = found.origin.reading
-    assert (reading.joints, reading.joints_told) == (("elbow", "wrist"), "names")
-    assert [notice.code for notice in found.notices] == ["JOINT_ORDER"]
-    assert assigned(PLAIN).origin.reading.joints_told == "names"
-    assert assigned(PLAIN, sources).origin.reading.joints_told == "profile"
-    told = assigned(named, {"joints": ["wrist", "elbow"]})
-    reading = told.origin.reading
-    assert (reading.joints, reading.joints_told) == (("wrist", "elbow"), "profile")
-    assert told.notices == ()
-    assert told.origin.mapping["tau1"] == "wrist_torque"
-
-
 def said(found: TableReader) -> list[tuple[str, str]]:
     return [(notice.code, notice.text) for notice in found.notices]
 

@@ -8,7 +8,7 @@ missing, damaged, cut off, of another format, or changed since algid wrote it.
 from __future__ import annotations
 
 import re
-import tomllib
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,17 +22,11 @@ from algid.log import Log
 from algid.profile import Profile, load_profile, with_settings
 from algid.readers import read_log
 from algid.writers import write_log
+from tests.cli.commands import profile_from
 from tests.inspection.test_checks import moving_log, noticed, spoiled
 from tests.readers.logs import EPOCH_NS
 from tests.readers.ways import Message, States, written
 
-FLAGS = {
-    "--joints": "joints",
-    "--topic": "topic",
-    "--set clock": "clock",
-    "--accept": "accept",
-    "--zero": "zero",
-}
 ROWS = 40
 
 
@@ -104,11 +98,6 @@ def no_stamps(folder: Path) -> Path:
     return Path(written("json", folder, States(found)))
 
 
-def accepted(code: str) -> Refusal:
-    """A check that may be told to let a log pass."""
-    return Refusal(found(code), code, f"--accept {code}", code)
-
-
 def with_nan() -> Callable[[Path], Path]:
     broken = np.sin(np.arange(ROWS))
     broken[7] = np.nan
@@ -118,11 +107,6 @@ def with_nan() -> Callable[[Path], Path]:
 REFUSALS = {
     "continuous joints": Refusal(continuous, "DEGREES", "--angle-unit rad", "DEGREES"),
     "degrees by velocity": Refusal(found("DEGREES"), "DEGREES", "--angle-unit rad", "DEGREES"),
-    "degrees accepted": accepted("DEGREES"),
-    "wrapped": accepted("WRAPPED_ANGLE"),
-    "zero torque": accepted("EFFORT_ZERO"),
-    "denormal torque": accepted("EFFORT_ZERO"),
-    "constant torque": accepted("EFFORT_ZERO"),
     "current without its constant": Refusal(
         table("t,q1,q2,current1,current2"),
         "torque_constant",
@@ -171,25 +155,15 @@ REFUSALS = {
 }  # fmt: skip
 
 
-def settings_of(flags: str) -> dict[str, Any]:
-    """Flags of the command line as settings of a profile."""
-    settings: dict[str, Any] = {}
-    for flag, value in re.findall(r'(--[\w-]+) ((?:"[^"]*"|\S)+)', flags):
+def settings_of(flags: str) -> Profile:
+    """The profile that flags of the command line mean."""
+    words, given = shlex.split(flags), dict[str, Any]()
+    for flag, value in zip(words[::2], words[1::2], strict=True):
         if flag == "--set":
-            key, _, text = value.partition("=")
-            try:
-                new = tomllib.loads(f"{key} = {text}")
-            except tomllib.TOMLDecodeError:
-                new = tomllib.loads(f'{key} = "{text}"')
-            for name, inner in new.items():
-                settings[name] = (
-                    {**settings.get(name, {}), **inner} if isinstance(inner, dict) else inner
-                )
-        elif flag == "--angle-unit":
-            settings |= {name: {"unit": value} for name in ("theta1", "theta2", "omega1", "omega2")}
+            given.setdefault("set", []).append(value)
         else:
-            settings[FLAGS[flag]] = value.split(",") if flag == "--joints" else value
-    return settings
+            given[flag[2:].replace("-", "_")] = value
+    return profile_from(given)
 
 
 @pytest.mark.parametrize("name", REFUSALS)
@@ -205,7 +179,7 @@ def test_each_refusal_yields_to_the_flag_it_names(name: str, tmp_path: Path) -> 
         assert named in str(refused.value)
         assert flag_first(str(refused.value)), refused.value
         assert "\n" not in str(refused.value)
-    log = read_log(path, with_settings(Profile(), settings_of(refusal.flags)))
+    log = read_log(path, settings_of(refusal.flags))
     seen = (*log.notices, *noticed(log))
     if refusal.warning:
         assert refusal.warning in [notice.code for notice in seen]
