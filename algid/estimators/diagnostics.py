@@ -71,38 +71,31 @@ class BrokenBound:
     distance: float | None
 
 
-def bounds(shared: Shared) -> dict[str, Callable[[FloatArray], float]]:
-    """Functions of the shared parameters that must not be negative, by name.
+def bounds(shared: Shared, beta: FloatArray) -> dict[str, float]:
+    """What must not be negative at the shared parameters `beta` (Q,), by name.
 
-    Each takes (Q,) and gives a float in the bound's own unit: kg m², its square, the parameter's,
-    or k1 k2's.
+    Each is in its own unit: kg m², its square, the parameter's, or k1 k2's.
     """
-    by_text: dict[str, Callable[[FloatArray], float]] = {
-        "M22 > 0": lambda beta: _mass(shared, beta)[0],
-        "det M > 0 at theta2 = 0": lambda beta: _mass(shared, beta)[1],
-        "det M > 0 at theta2 = pi": lambda beta: _mass(shared, beta)[2],
-    }
-    if shared.model.gravity > 0:
-        # Table 1: k1 k2 = m2² g l1 lc2²; as phasors, θ1's zero lies between them
-        by_text["k1 k2 >= 0"] = lambda beta: (
-            (phasor(shared.model, beta, K1) * phasor(shared.model, beta, K2).conjugate()).real
-        )
-    for place, name in enumerate(shared.names):
-        if name in _NOT_NEGATIVE:
-            by_text[f"{name} >= 0"] = lambda beta, place=place: float(beta[place])  # type: ignore[misc]
-    return by_text
-
-
-def _mass(shared: Shared, beta: FloatArray) -> tuple[float, float, float]:
-    """M22 and the determinant of M at θ2 = 0 and π."""
-    c = beta[: len(shared.model.names)]
-    bent = -float(np.angle(phasor(shared.model, c, K1)))
+    model = shared.model
+    k1 = phasor(model, beta, K1)
+    bent = -float(np.angle(k1))
     if abs(bent) > np.pi / 2:
         bent += np.pi  # k1 itself may be negative: a convention of θ2
     poses = np.array([[0.0, 0.0], [bent, bent + np.pi]])
-    (m11, m12), (m21, m22) = inertia(shared.model, c, poses)
-    det = m11 * m22 - m12 * m21
-    return float(m22[0]), float(det[0]), float(det[1])
+    (m11, m12), (m21, m22) = inertia(model, beta[: len(model.names)], poses)
+    at_0, at_pi = (m11 * m22 - m12 * m21).tolist()
+    values = {
+        "M22 > 0": float(m22[0]),
+        "det M > 0 at theta2 = 0": at_0,
+        "det M > 0 at theta2 = pi": at_pi,
+    }
+    if model.gravity > 0:
+        # Table 1: k1 k2 = m2² g l1 lc2²; as phasors, θ1's zero lies between them
+        values["k1 k2 >= 0"] = (k1 * phasor(model, beta, K2).conjugate()).real
+    for name, value in zip(shared.names, beta.tolist(), strict=True):
+        if name in _NOT_NEGATIVE:
+            values[f"{name} >= 0"] = value
+    return values
 
 
 def broken_bounds(fit: Fit) -> list[BrokenBound]:
@@ -123,15 +116,15 @@ def broken_bounds(fit: Fit) -> list[BrokenBound]:
     if {K1, K3, K5} & set(fit.absent):
         open_ones |= {"M22 > 0", "det M > 0 at theta2 = 0", "det M > 0 at theta2 = pi"}
     broken = []
-    for name, bound in bounds(fit.shared).items():
-        value = bound(fit.values)
-        if value >= 0 or name in open_ones:
-            continue
-        _, deviation = measured(fit, bound)
-        distance = None
-        if deviation > 0:
-            distance = -value / deviation
-        broken.append(BrokenBound(name, value, distance))
+
+    def value_of(name: str, beta: FloatArray) -> float:
+        return bounds(fit.shared, beta)[name]
+
+    for name, value in bounds(fit.shared, fit.values).items():
+        if value < 0 and name not in open_ones:
+            _, deviation = measured(fit, partial(value_of, name))
+            distance = -value / deviation if deviation > 0 else None
+            broken.append(BrokenBound(name, value, distance))
     return broken
 
 
@@ -161,11 +154,14 @@ def measured(fit: Fit, function: Callable[[FloatArray], float]) -> tuple[float, 
     return function(fit.values), float(np.sqrt(max(variance, 0.0)))
 
 
-def _slope(bound: Callable[[FloatArray], float], beta: FloatArray, size: FloatArray) -> FloatArray:
-    slope = np.empty(beta.size)
-    for place, step in enumerate(_NUDGE * np.diag(size)):
-        slope[place] = (bound(beta + step) - bound(beta - step)) / (2 * step.max())
-    return slope
+def _slope(
+    function: Callable[[FloatArray], FloatArray | float], beta: FloatArray, size: FloatArray
+) -> FloatArray:
+    """Derivatives (Q, ...) by the parameters `beta` (Q,), by differences of a share of `size`."""
+    steps = _NUDGE * np.diag(size)
+    return np.array(
+        [(function(beta + step) - function(beta - step)) / (2 * step.max()) for step in steps]
+    )
 
 
 def constrained(fit: Fit) -> Fit:
@@ -196,12 +192,14 @@ def constrained(fit: Fit) -> Fit:
         value, gradient, _ = likelihood(fit.shared, fit.logs, fit.values + scale * x, fit.prior)
         return -value / unit, -gradient * scale / unit
 
-    limits = list(bounds(fit.shared).values())
-    steepness = [np.linalg.norm(_slope(bound, fit.values, size) * size) or 1.0 for bound in limits]
+    def margins(beta: FloatArray) -> FloatArray:
+        return np.array(list(bounds(fit.shared, beta).values()))
 
-    def margins(x: FloatArray, inside: float) -> FloatArray:
-        values = [bound(fit.values + scale * x) for bound in limits]
-        return np.array(values) / steepness - inside
+    steepness = np.linalg.norm(_slope(margins, fit.values, size) * size[:, None], axis=0)
+    steepness[steepness == 0] = 1.0
+
+    def within_bounds(x: FloatArray, inside: float) -> FloatArray:
+        return margins(fit.values + scale * x) / steepness - inside
 
     x, disobeyed = np.zeros(scale.size), enforced
     options = {"maxiter": 500, "ftol": 1e-12}
@@ -212,7 +210,7 @@ def constrained(fit: Fit) -> Fit:
             x,
             jac=True,
             method="SLSQP",
-            constraints={"type": "ineq", "fun": partial(margins, inside=inside)},
+            constraints={"type": "ineq", "fun": partial(within_bounds, inside=inside)},
             options=options,
         )
         if not np.all(np.isfinite(solution.x)):

@@ -48,7 +48,7 @@ from algid.estimators.fit import Fit, finish
 from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem, Source, WeakSettings
-from algid.estimators.references import Following, followed
+from algid.estimators.references import Explained, followed
 from algid.model import Model, advanced, inertia
 from algid.signals.filters import correlate, differentiator, half_length, smoother
 from algid.signals.segments import Segment
@@ -108,7 +108,7 @@ def evidence(
     problem: Problem,
     shared: Shared,
     beta: FloatArray,
-    following: Following | None = None,
+    following: Explained | None = None,
 ) -> list[LogInformation] | None:
     """Each log's likelihood projected on instruments, simulated at shared parameters `beta` (Q,).
 
@@ -213,10 +213,10 @@ def _driven(batch: Sequence[_Piece], model: Model, c: FloatArray) -> Iterator[_M
         yield Windows(h, steps * h, 0.0, None), motion, OVERLAP, good[own]
 
 
-def _explained(following: Following, batch: Sequence[_Piece]) -> Iterator[_Motion]:
+def _explained(following: Explained, batch: Sequence[_Piece]) -> Iterator[_Motion]:
     """What the reference explains of each piece; of one without, no window is good."""
     for _, piece, windows in batch:
-        motion = following.motion(piece)
+        motion = following(piece)
         count = (len(piece) - 2 * windows.margin) // windows.step - OVERLAP
         good = np.full(count // _STRIDE + 1, motion is not None)
         yield windows, motion or piece, _STRIDE, good

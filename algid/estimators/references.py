@@ -21,11 +21,12 @@ B       what the reference makes of angles and torques           (4, m)    mixed
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from algid.arm import FloatArray, keep_arrays
+from algid.arm import FloatArray
 from algid.estimators import weak
 from algid.estimators.combine import scaled_pinv
 from algid.estimators.problem import Problem
@@ -40,30 +41,12 @@ FOLLOWED = 0.5
 """Share of each joint's motion (R²) that a reference explains, at least, to be an instrument."""
 
 
-@dataclass(frozen=True, eq=False)
-class Following:
-    """How an arm follows its reference: `B` (4, m) as in the module's table."""
-
-    B: FloatArray
-
-    def __post_init__(self) -> None:
-        keep_arrays(self)
-
-    def motion(self, piece: Segment) -> Segment | None:
-        """The piece with the angles, velocities and torques that its reference explains.
-
-        None where it has none.
-        """
-        F = _features(piece)
-        if F is None:
-            return None
-        explained = self.B @ F
-        theta, tau = explained[:2], explained[2:]
-        omega = None if piece.omega is None else np.gradient(theta, piece.dt, axis=1)
-        return replace(piece, theta=theta, tau=tau, omega=omega)
+Explained = Callable[[Segment], Segment | None]
+"""Gives a piece with the angles, velocities and torques that its reference explains; None where it
+has none."""
 
 
-def followed(problem: Problem) -> Following | None:
+def followed(problem: Problem) -> Explained | None:
     """How the arm follows the references of its logs; None where one has none, or it does not."""
     gram = None
     for source in problem.logs:
@@ -85,7 +68,18 @@ def followed(problem: Problem) -> Following | None:
     count, sums = gram[m - 1, m - 1], gram[m : m + 2, m - 1]
     total = np.diag(gram)[m : m + 2] - sums**2 / count
     left = np.diag(gram)[m : m + 2] - np.sum(B[:2] * gram[m : m + 2, :m], axis=1)
-    return Following(B) if np.all(left < (1 - FOLLOWED) * total) else None
+    if not np.all(left < (1 - FOLLOWED) * total):
+        return None
+
+    def explained(piece: Segment) -> Segment | None:
+        F = _features(piece)
+        if F is None:
+            return None
+        theta, tau = np.split(B @ F, 2)
+        omega = None if piece.omega is None else np.gradient(theta, piece.dt, axis=1)
+        return replace(piece, theta=theta, tau=tau, omega=omega)
+
+    return explained
 
 
 def _features(piece: Segment) -> FloatArray | None:

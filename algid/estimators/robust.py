@@ -76,7 +76,7 @@ from algid.estimators.fit import Fit, finish, solved_anew
 from algid.estimators.modulating_functions import Known, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
-from algid.estimators.references import Following, followed
+from algid.estimators.references import Explained, followed
 from algid.estimators.repeats import Groups, grouped, merged, shared_out
 from algid.estimators.weak import Normal
 from algid.model import DELAYS, EVERY_TERM, K3, K5, RIGID, SINES, TERMS, attributes
@@ -346,7 +346,7 @@ class RobustProblem:
         return replace(corrected, endogeneity=distance).noted(note)
 
     def by_instruments(
-        self, least: Fit, at: FloatArray, following: Following | None = None
+        self, least: Fit, at: FloatArray, following: Explained | None = None
     ) -> Fit | None:
         """The parameters of `least` by instruments at `at` (Q,), with its terms and its prior.
 

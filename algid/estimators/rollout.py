@@ -82,17 +82,15 @@ def rollouts(
     `shift` is the time in s after which a logged torque acts, as for `scored_torque`.
     """
     step = time_step(model, c)
-    states, torques, later = [], [], []
     spacing = max(_CLOSEST, duration / _STARTS)
+    made = []
     for piece in pieces_of(segments, _PIECE_SECONDS):
-        x, u, y = _starts(model, c, piece, spacing, step, shift)
-        if x.shape[1]:
-            states.append(x)
-            torques.append(u)
-            later.append(y)
-    if not states:
+        starts = _starts(model, c, piece, spacing, step, shift)
+        if starts is not None:
+            made.append(starts)
+    if not made:
         return RolloutScore()
-    x, u, y = (np.concatenate(parts, axis=-1) for parts in (states, torques, later))
+    x, u, y = (np.concatenate(parts, axis=-1) for parts in zip(*made, strict=True))
     angles = np.stack(_angles_at_horizons(model, c, x, u, step))
     judged = np.isfinite(y[:, 0])
     with np.errstate(over="ignore", invalid="ignore"):
@@ -127,17 +125,17 @@ def stiffness(model: Model, c: FloatArray) -> float:
 
 def _starts(
     model: Model, c: FloatArray, piece: Segment, spacing: float, step: float, shift: TorqueShift
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """x, u and y of the starts in a piece of a log.
+) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """x, u and y of the starts in a piece of a log that have the first horizon ahead of them.
 
-    Only starts with the first horizon ahead of them.
+    None where there is no such start.
     """
     dt, n = piece.dt, len(piece)
     halves = 2 * round(HORIZONS[-1] / step) + 1
     edge, first = round(DROPPED / dt), round(HORIZONS[0] / dt)
     at = np.arange(edge, n - edge - first, max(1, round(spacing / dt)))
     if n <= 6 * (ORDER + 1) or not at.size:
-        return np.zeros((4, 0)), np.zeros((halves, 2, 0)), np.zeros((len(HORIZONS), 2, 0))
+        return None
     motion = motion_of(butterworth(piece.theta, dt, min(MOTION, 0.45 / dt)), dt)
     late = shift.at(dt) - model.lag(c)
     when = at * dt + 0.5 * step * np.arange(halves)[:, None] - late

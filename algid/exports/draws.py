@@ -73,7 +73,7 @@ def drawn_files(
     freedom, random = float(stdtridf(0.975, result.quantile)), np.random.default_rng(seed)
     freedom = inf if freedom > _MOST_FREEDOM else freedom
     shared = Shared(model, payload="m_p" in names, body=within(BODY_PARAMETERS, names))
-    limits, broken = bounds(shared), list[str]()
+    broken = list[str]()
     files: dict[str, bytes] = {"manifest.json": b""}
     rows: list[dict[str, Any]] = []
     refused = in_a_row = 0
@@ -89,7 +89,7 @@ def drawn_files(
         )
         numbers = dict(zip(names, (mean + size * one_each * wide).tolist(), strict=True))
         beta = np.array([numbers.get(name, 0.0) for name in shared.names])
-        broken = [name for name, limit in limits.items() if limit(beta) < 0]
+        broken = [name for name, value in bounds(shared, beta).items() if value < 0]
         moved = {}
         for kind, given in (("parameters", result.parameters), ("payload", result.payload)):
             moved[kind] = {

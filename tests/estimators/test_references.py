@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from algid.arm import FloatArray
 from algid.estimators.problem import WeakSettings
-from algid.estimators.references import Following, followed
+from algid.estimators.references import Explained, followed
 from algid.log import Log, Origin, join
 from algid.signals.segments import Segment, segments
 from tests.estimators.conftest import problem_of
@@ -33,7 +33,7 @@ def log(seed: int, *, disturbance: float = 0.3) -> tuple[Segment, FloatArray]:
     return Segment(0.0, DT, theta, theta - clean, reference=reference), clean
 
 
-def asked(*logs: Segment) -> Following:
+def asked(*logs: Segment) -> Explained | None:
     return followed(problem_of(*logs, settings=SETTINGS))
 
 
@@ -44,7 +44,7 @@ def test_the_motion_that_the_reference_makes_is_found_without_the_disturbance() 
     made = [log(seed) for seed in range(6)]
     found = asked(*(one for one, _ in made))
     piece, clean = made[0]
-    motion = found.motion(piece)
+    motion = found(piece)
     settled = slice(250, None)  # the longest lag: what was before the log nobody knows
     off = np.std(motion.theta[:, settled] - clean[:, settled], axis=1)
     disturbance = np.std(piece.theta[:, settled] - clean[:, settled], axis=1)
