@@ -276,7 +276,6 @@ def payload(x: FloatArray, k: FloatArray, gravity: float) -> tuple[FloatArray, F
 
 SETTLED = 0.2  # s at the end of each window
 SHORTEST = EPSILON + SETTLED  # s
-BLOCK_SAMPLES = 16384  # bounds the memory: some 3 kB a sample
 
 STAGE1_SERIES = (*CONSTANT_NAMES, "k5+k3", "condition", "k7_condition")
 STAGE2_SERIES = (*STAGE2_NAMES, "l1", "m_p", "condition")
@@ -316,33 +315,10 @@ def series_of(source: Iterable[Segment], window: float, stage: Stage) -> Iterato
         What is left over at the end of a segment is a window too, down to eight samples.
     stage : `stage1`, or `stage2` with what it knows
     """
-    for batch in _batches(pieces_of(source, window, least=8)):
-        dt = batch[0].dt
-        theta, tau, omega = (
-            np.stack([getattr(window, signal) for window in batch], axis=1)
-            for signal in ("theta", "tau", "omega")
-        )
-        values = stage(theta, omega, tau, dt)
-        for index, piece in enumerate(batch):
-            yield PaperSeries(t=piece.t, values=values[:, index], settled=round(SETTLED / dt))
-
-
-def _batches(windows: Iterable[Segment]) -> Iterator[list[Segment]]:
-    """Neighbouring windows of one length, as many as a block holds.
-
-    Windows too short to integrate are left out.
-    """
-    batch: list[Segment] = []
-    for window in windows:
-        if len(window) < 8:
-            continue
-        full = len(window) * (len(batch) + 1) > BLOCK_SAMPLES
-        if batch and (full or len(batch[0]) != len(window)):
-            yield batch
-            batch = []
-        batch.append(window)
-    if batch:
-        yield batch
+    for piece in pieces_of(source, window, least=8):
+        if len(piece) >= 8 and piece.omega is not None:  # what is shorter cannot be integrated
+            values = stage(piece.theta, piece.omega, piece.tau, piece.dt)
+            yield PaperSeries(t=piece.t, values=values, settled=round(SETTLED / piece.dt))
 
 
 def estimates(quartiles: Sequence[FloatArray], size: int) -> tuple[FloatArray, FloatArray]:

@@ -184,12 +184,8 @@ def scored_torque(
             whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
             Y = Y[:, :, whole] + (place - whole) * (Y[:, :, whole + 1] - Y[:, :, whole])
         X = np.concatenate([Y, signals[2:, None]], axis=1)
-        felt = np.asarray(X.any(axis=2))  # k4 is nothing to joint 2, k7 to joint 1
-        alike = np.all(X[0] == X[1], axis=1)  # and k2, k3 to both the same
-        felt[1] &= ~alike
-        X[felt] = butterworth(X[felt], dt, min(CUTOFF, 0.45 / dt))
-        X[1, alike] = X[0, alike]
-        X = X[:, :, edge : signals.shape[1] - edge]
+        low = butterworth(X.reshape(-1, X.shape[2]), dt, min(CUTOFF, 0.45 / dt))
+        X = low.reshape(X.shape)[:, :, edge : signals.shape[1] - edge]
         kept = np.arange(edge, signals.shape[1] - edge)
         yield ScoredTorque(first + dt * kept, X[:, 1:], X[:, 0])
 

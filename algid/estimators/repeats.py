@@ -32,23 +32,16 @@ Groups = tuple[tuple[int, ...], ...]
 
 def grouped(unloaded: Sequence[Source], loaded: Sequence[Source]) -> Groups:
     """Groups of the unloaded and then the loaded logs, by their places in that order."""
-    return _groups(unloaded, 0) + _groups(loaded, len(unloaded))
-
-
-def _groups(sources: Sequence[Source], start: int) -> Groups:
-    """Groups of logs of one kind, whose places begin at `start`."""
-    firsts: list[FloatArray] = []  # the motion of each group's first log
-    groups: list[tuple[int, ...]] = []
-    for place, source in enumerate(sources, start):
-        motion = _velocities(source)
-        for number, first in enumerate(firsts):
-            if alike(first, motion):
-                groups[number] += (place,)
+    groups: list[tuple[bool, FloatArray, list[int]]] = []  # kind, and the first log's motion
+    for place, source in enumerate([*unloaded, *loaded]):
+        kind, motion = place >= len(unloaded), _velocities(source)
+        for other, first, places in groups:
+            if other is kind and alike(first, motion):
+                places.append(place)
                 break
         else:
-            firsts.append(motion)
-            groups.append((place,))
-    return tuple(groups)
+            groups.append((kind, motion, [place]))
+    return tuple(tuple(places) for _, _, places in groups)
 
 
 def alike(one: FloatArray, other: FloatArray) -> bool:

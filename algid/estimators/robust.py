@@ -336,12 +336,9 @@ class RobustProblem:
         # least squares is off by more than its error bars take in
         if not (same < level("INSTRUMENTS") and moved > MOVES):
             return fit
-        case = "reference"
-        if following is None:
-            case = "torque"
-            silent = no_feedback(corrected, self.problem)
-            if silent < ANSWERS:
-                return fit.noted(feedback(silent))
+        if following is None and (answers := feedback(corrected, self.problem, ANSWERS)):
+            return fit.noted(answers)
+        case = "torque" if following is None else "reference"
         note = Notice("INSTRUMENTS", numbers={"case": case, "distance": moved, "p_value": same})
         return replace(corrected, endogeneity=distance).noted(note)
 
@@ -517,14 +514,11 @@ def _influences(fit: Fit) -> list[FloatArray]:
     return influences
 
 
-def feedback(p_value: float) -> Notice:
-    """That the measured torque answers what the model lacks."""
-    remedy = Remedy({"estimator": "weak"}, "to compare")
-    return Notice("FEEDBACK", numbers={"p_value": p_value}, remedies=(remedy,))
+def feedback(fit: Fit, problem: Problem, limit: float) -> Notice | None:
+    """That the measured torque answers what the model lacks.
 
-
-def no_feedback(fit: Fit, problem: Problem) -> float:
-    """Bonferroni p value of the residual's correlations with later torques without feedback."""
+    By the Bonferroni p value of the residual's correlations with later torques, below `limit`.
+    """
     settings = problem.at(fit.shared.model, fit.delay).settings
     products, variance = np.zeros((2, 2 * _LAGS))
     for kind, sources in problem.kinds():
@@ -537,9 +531,11 @@ def no_feedback(fit: Fit, problem: Problem) -> float:
                 own, spread = _crossed(rows[:2], rows[2:])
                 products, variance = products + own, variance + spread
     if not np.all(variance > 0):
-        return 1.0
-    largest = float(np.max(np.abs(products) / np.sqrt(variance)))
-    return chance(largest, products.size)
+        return None
+    p_value = chance(float(np.max(np.abs(products) / np.sqrt(variance))), products.size)
+    remedy = Remedy({"estimator": "weak"}, "to compare")
+    notice = Notice("FEEDBACK", numbers={"p_value": p_value}, remedies=(remedy,))
+    return notice if p_value < limit else None
 
 
 def _crossed(e: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -552,12 +548,8 @@ def _crossed(e: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def with_feedback_noted(fit: Fit, problem: Problem) -> Fit:
     """A fit by instruments, with a warning where it is the torque and answers the motion."""
-    if followed(problem) is not None:
-        return fit
-    silent = no_feedback(fit, problem)
-    if silent >= level("FEEDBACK"):
-        return fit
-    return fit.noted(feedback(silent))
+    answers = None if followed(problem) else feedback(fit, problem, level("FEEDBACK"))
+    return fit.noted(answers) if answers else fit
 
 
 def unshrunk(fit: Fit, name: str) -> Fit:

@@ -50,13 +50,13 @@ def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> dic
     places, times, rows = [], [], []
     for number, log in enumerate(fit.logs):
         count = max(2, round(moments * durations[number] / sum(durations)))
-        ends = np.unique(np.linspace(0, log.S.shape[0], count + 1).astype(int)[1:])
-        S, g = np.zeros_like(log.S[0]), np.zeros_like(log.g[0])
-        begin = 0
+        ends = np.unique(np.linspace(0, log.S.shape[0], count + 1).astype(int))[1:]
+        S, g = np.cumsum(log.S, axis=0), np.cumsum(log.g, axis=0)
         for end in ends:
-            S, g = S + log.S[begin:end].sum(axis=0), g + log.g[begin:end].sum(axis=0)
-            begin = int(end)
-            so_far = [*fit.logs[:number], LogInformation(log.loaded, log.c0, S[None], g[None])]
+            so_far = [
+                *fit.logs[:number],
+                LogInformation(log.loaded, log.c0, S[end - 1 : end], g[end - 1 : end]),
+            ]
             beta, std = _estimate(fit, so_far)
             places.append(number)
             times.append(durations[number] * end / log.S.shape[0])

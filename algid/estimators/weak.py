@@ -120,6 +120,8 @@ def first_estimate(
     """Shared parameters from which `finish` starts, and each log's likelihood.
 
     `solved` holds what unloaded (False) and loaded logs give by themselves, where there are any.
+    The payload is the one that fits the loaded logs best for the arm: masses are tried in turn,
+    each with the lengths that follow from k2 and k4 of both arms (Table 2).
 
     Raises
     ------
@@ -140,7 +142,21 @@ def first_estimate(
         return arm, logs
     _, under_load = solved[True]
     ((whole,), _) = by_kind(under_load)
-    return first_payload(shared, arm, whole), logs + under_load
+    # A prior far tighter than the loaded logs holds the arm.
+    hold = Prior.of(shared.log_names, arm, scaled_pinv(whole.total[0]) * 1e-4)
+    change = dict(zip(shared.log_names, (whole.c0 - arm).tolist(), strict=True))
+    best: FloatArray | None = None
+    most = -np.inf
+    for mass in _FIRST_MASSES:
+        guess = {"m_p": mass}
+        for name, moment in (("l1", K4), ("l2", K2)):
+            length = change.get(moment, 0.0) / max(mass * shared.model.gravity, 1e-300)
+            guess[name] = length if 0.01 < length < 10 else _FIRST_LENGTH
+        start = np.append(arm, [guess[name] for name in shared.names[arm.size :]])
+        beta, _, value = combine(shared, [whole], start, hold)
+        if value > most and np.all(beta[arm.size :] > 0):
+            best, most = beta, value
+    return start if best is None else best, logs + under_load
 
 
 @dataclass(frozen=True, eq=False)
@@ -364,40 +380,3 @@ def solve(normals: Sequence[Normal], loaded: bool = False) -> Solved:
     c, _ = reweighted(weigh, solved, start)
     both = zip(normals, weigh(c), strict=True)
     return c, [evidence(normal, own, c, loaded) for normal, own in both]
-
-
-def first_payload(shared: Shared, arm: FloatArray, loaded: LogInformation) -> FloatArray:
-    """Shared parameters (Q,): the payload that fits the loaded logs best for a given arm (q,).
-
-    Masses are tried in turn, each with the link lengths that follow from k2 and k4 of both arms
-    (Table 2). `loaded` is the sum over the loaded logs, linearised at the loaded arm's own
-    coefficients.
-    """
-    best: FloatArray | None = None
-    best_value = -np.inf
-    # A prior far tighter than the loaded logs holds the arm.
-    hold = Prior.of(shared.log_names, arm, scaled_pinv(loaded.total[0]) * 1e-4)
-    for mass in _FIRST_MASSES:
-        change = loaded.c0 - arm
-        guess = {
-            "m_p": mass,
-            "l1": _length_of(shared, change, mass, K4),
-            "l2": _length_of(shared, change, mass, K2),
-        }
-        start = np.append(arm, [guess[name] for name in shared.names[arm.size :]])
-        beta, _, value = combine(shared, [loaded], start, hold)
-        if value > best_value and np.all(beta[arm.size :] > 0):
-            best, best_value = beta, value
-    if best is None:
-        return start
-    return best
-
-
-def _length_of(shared: Shared, change: FloatArray, mass: float, name: str) -> float:
-    """Length in m from the change of the gravity constant `name` by `mass` kg, else a default."""
-    if name not in shared.log_names:
-        return _FIRST_LENGTH
-    length = float(change[shared.log_names.index(name)]) / (mass * shared.model.gravity)
-    if not 0.01 < length < 10:
-        return _FIRST_LENGTH
-    return length
