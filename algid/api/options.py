@@ -49,7 +49,7 @@ from algid.profile import Effort, Profile, load_profile, over, with_settings
 from algid.settings import DEFAULTS, OF_BOTH, Settings
 
 if TYPE_CHECKING:
-    from algid.identification.open_logs import LogLike
+    from algid.identification.recordings import LogLike
     from algid.results import Result
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import polars as pl
     from plotly.graph_objects import Figure
 
-    from algid.identification.open_logs import LogLike
+    from algid.identification.recordings import LogLike
 
 
 class Result(results.Result):  # noqa: D101

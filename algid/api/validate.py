@@ -87,10 +87,9 @@ def validate(
     >>> algid.validate(result, log.part(2000, 4001)).total.r2[0] > 0.999
     True
     """
-    from algid.identification.known import as_logged, reused
-    from algid.identification.open_logs import open_sources, read_otherwise
+    from algid.identification.known import as_logged, read_otherwise, reused
     from algid.identification.prior import read_urdf
-    from algid.identification.recordings import Recordings
+    from algid.identification.recordings import Recordings, open_sources
     from algid.identification.validate import Validated, predictor_of
     from algid.identification.validate import validate as predicted
 
@@ -110,7 +109,7 @@ def validate(
         own = reused(own, known, file)
         model = predictor_of(as_logged(known, own), file)
     gravity = model.model.gravity
-    survey = Recordings(open_sources(logs, loaded, own, gravity), progress)
+    survey = Recordings(open_sources(logs, loaded, own), progress, gravity)
     survey.begin("prediction")
     found = predicted(model, survey, simulate=simulate)
     warnings = list[str]()

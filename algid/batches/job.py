@@ -24,7 +24,7 @@ from algid.base.runtime import keep_freed, keep_to_one_core
 from algid.base.stores import is_url, open_store, put_folder, reading
 from algid.batches.jobs import Input, Job, JobRecord, JobStatus, redacted_path, stat_of
 from algid.identification.identify import identify
-from algid.identification.open_logs import Staged
+from algid.identification.recordings import Staged
 from algid.options import flag
 from algid.results import Result
 from algid.settings import Settings

@@ -16,14 +16,13 @@ from algid.base.progress import Progress
 from algid.base.runtime import one_blas_thread
 from algid.estimators.paper import SHORTEST
 from algid.identification.by_paper import run_paper
-from algid.identification.known import contradictions, prior_of, reused
-from algid.identification.open_logs import (
-    LogLike,
-    open_sources,
-    read_otherwise,
-)
+from algid.identification.known import contradictions, prior_of, read_otherwise, reused
 from algid.identification.outcome import judged
-from algid.identification.recordings import Recordings
+from algid.identification.recordings import (
+    LogLike,
+    Recordings,
+    open_sources,
+)
 from algid.identification.series import residual_of, write_fit_series
 from algid.methods import estimator_of, settles
 from algid.options import flag
@@ -137,8 +136,8 @@ def identify(
     if earlier is not None:
         meaning = reused(profile, earlier.result, earlier.file)
     settings = _with_meaning(settings, meaning, earlier)
-    sources = open_sources(unloaded, loaded, meaning, settings.gravity, settings.effort)
-    survey = Recordings(sources, progress)
+    sources = open_sources(unloaded, loaded, meaning)
+    survey = Recordings(sources, progress, settings.gravity, settings.effort)
     stated: dict[str, Any] = {}
     if meaning is not None:
         stated = meaning.model_dump(mode="json", exclude_unset=True)

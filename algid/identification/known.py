@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import isclose
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,6 @@ from algid.base.significance import CERTAIN, sigmas
 from algid.estimators.combine import Prior
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.estimators.whitening import NoiseLevels
-from algid.identification.recordings import Role
 from algid.model import (
     K1,
     K2,
@@ -31,11 +31,12 @@ from algid.model import (
 from algid.notices import Notice
 from algid.options import flag
 from algid.physics.effort import absent
-from algid.results import Result
+from algid.results import LogSummary, Result
 from algid.settings import DEFAULTS, Settings
 from algid.signals.shift import TorqueShift
 
 if TYPE_CHECKING:
+    from algid.identification.recordings import Role
     from algid.profile import Profile
 
 FAR = sigmas(CERTAIN)  # beyond which two statements contradict each other
@@ -276,3 +277,18 @@ def contradicting(
     numbers: dict[str, Any] = {"case": "identified", "name": name, "given": given}
     distance = off / std if std else np.inf
     return numbers | {"estimate": estimate, "half": quantile * std, "distance": distance}
+
+
+def read_otherwise(logs: Sequence[LogSummary], earlier: Result, file: str) -> list[Notice]:
+    """Warnings of logs read otherwise than those of an earlier result, which `file` holds."""
+    before = earlier.log.reading
+    if before is None:
+        return []
+    notices = []
+    for log in logs:
+        differences = sorted(log.reading.differences(before)) if log.reading else []
+        if differences:
+            numbers = {"case": "reading", "file": file, "differences": ", ".join(differences)}
+            name = PurePath(log.path).name
+            notices.append(Notice("OTHER_ARM", numbers=numbers, logs=(name,)))
+    return notices

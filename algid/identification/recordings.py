@@ -1,26 +1,33 @@
-"""Recordings: logs as estimators go over them, judged once an arm and read as rarely as can be."""
+"""Recordings: logs opened from files and memory, judged once an arm, read as rarely as can be."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import hashlib
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import chain, islice
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from algid.base.errors import LogError
+from algid.base.files import sha256_of
 from algid.base.names import evenly_spread
 from algid.base.progress import Progress
-from algid.base.runtime import beside
+from algid.base.runtime import ahead, beside
 from algid.log import Log, Origin
 from algid.notices import Notice
+from algid.readers.clock import check_step
+from algid.readers.memory import FrameOrArrays, is_columns, refuse_others
 from algid.results import LogSummary
 from algid.signals.segments import Segment, segments
 
 if TYPE_CHECKING:
     from algid.estimators.convention_search import Recorded
     from algid.estimators.saturation import Limit, Saturation
+    from algid.profile import Profile
 
 EXAMINED = 1 << 15
 """Samples at the start of a long log that the named checks look at."""
@@ -44,8 +51,6 @@ class Recording:
     blocks : callable
         Gives a fresh pass over the samples.
     promised : samples that the file says it has, 0 where it does not
-    gravity : float, m/s^2, for the named checks
-    effort : as in `Settings`, for the named checks
     digest : callable or None
         Gives the SHA-256 of the log; None where only parts of it are here.
     notices : of opening it, then of the first pass too
@@ -56,8 +61,6 @@ class Recording:
     origin: Origin
     blocks: Callable[[], Iterator[Log]]
     promised: int
-    gravity: float
-    effort: str | None
     digest: Callable[[], str] | None
     notices: tuple[Notice, ...] = ()
     rows: int | None = field(default=None, init=False)
@@ -75,12 +78,142 @@ class Recording:
         """From the first to the last stamp, in s."""
         return (self.last_ns - self.first_ns) * 1e-9
 
-    @property
-    def weight(self) -> float:
-        """Gravity in m/s² in the torque; no driver compensates for that of a payload."""
-        if self.effort in ("gravity-compensated", "external") and self.role == "unloaded":
-            return 0.0
-        return self.gravity
+
+@dataclass(frozen=True)
+class Staged:
+    """A log that was fetched from an object store: its copy on this machine, and its URL."""
+
+    path: Path
+    url: str
+
+
+LogLike = str | Path | Log | Staged | FrameOrArrays
+
+
+def open_source(
+    log: LogLike, role: Role, profile: Profile | None = None, *, changing: bool = False
+) -> Recording:
+    """Open a log from a file, which is read ahead of whoever goes over it, or from memory.
+
+    Parameters
+    ----------
+    log : path, `Log`, `Staged`, or columns as `algid.readers.memory` takes them
+    role : 'unloaded' or 'loaded'
+    profile : Profile
+        What the log's names, units and signs mean.
+    changing : bool
+        Whether the payload may change: then the log is refused for no payload that its metadata
+        name.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be opened, or its metadata name another payload than its role.
+    """
+    from algid.readers import open_log
+
+    name = str(log)
+    if isinstance(log, Staged):
+        name, log = log.url, log.path
+    elif not isinstance(log, Log):
+        refuse_others(log)
+        if is_columns(log):
+            log = open_log(log, profile).whole()
+    if isinstance(log, Log):
+        source = _in_memory(log, role)
+    else:
+        assert isinstance(log, str | Path)
+        path = Path(log)
+        reader = open_log(path, profile)
+
+        def blocks() -> Iterator[Log]:
+            read = _checked(reader.blocks())
+            # of a short log a thread would cost more than it reads ahead
+            return read if 0 < reader.rows <= SHORT else ahead(read)
+
+        digest = cache(partial(sha256_of, path))
+        source = Recording(name, role, reader.origin, blocks, reader.rows, digest)
+    truth = source.origin.truth
+    if truth is None or changing:
+        return source
+    if truth.schedule:
+        raise LogError(
+            f"{source.name}: its metadata say that the payload changes; weigh it with algid track"
+        )
+    if (truth.payload > 0) != (role == "loaded"):
+        payload = "no payload"
+        if truth.payload > 0:
+            payload = f"a payload of {truth.payload:g} kg"
+        raise LogError(
+            f"{source.name}: expected a log of the {role} arm, its metadata say {payload}; "
+            "swap the logs"
+        )
+    return source
+
+
+def _in_memory(log: Log, role: Role) -> Recording:
+    """The log from arrays, whose angles are rad by its definition, however far joints turn."""
+    reading = log.origin.reading
+    if "theta1" not in reading.channels and "DEGREES" not in reading.accepted:
+        accepted = replace(reading, accepted=reading.accepted + ("DEGREES",))
+        log = replace(log, origin=replace(log.origin, reading=accepted))
+    check_step(log.origin.path, log.stamp_ns)
+
+    def digest() -> str:
+        every = hashlib.sha256()
+        for array in (log.stamp_ns, log.theta, log.tau):
+            every.update(array.tobytes())
+        return every.hexdigest()
+
+    return Recording(log.origin.path, role, log.origin, lambda: iter([log]), len(log), digest)
+
+
+def _checked(blocks: Iterable[Log]) -> Iterator[Log]:
+    """The blocks, of which the first has to be sampled as an arm is."""
+    for number, block in enumerate(blocks):
+        if number == 0:
+            check_step(block.origin.path, block.stamp_ns)
+        yield block
+
+
+def open_sources(
+    unloaded: LogLike | Iterable[LogLike] | None,
+    loaded: LogLike | Iterable[LogLike] | None,
+    profile: Profile | None = None,
+) -> list[Recording]:
+    """Sources of one log, several, or none of each role, unloaded ones first: see `open_source`.
+
+    A log that is given twice, byte for byte, counts once, and the first of the two has a notice of
+    the other; a loaded one that is also given as unloaded has a notice of that: its payload is
+    zero. Only logs that promise as many samples as another are hashed for it.
+    """
+    sources: list[Recording] = []
+    both: tuple[tuple[Role, LogLike | Iterable[LogLike] | None], ...]
+    both = (("unloaded", unloaded), ("loaded", loaded))
+    for role, logs in both:
+        if logs is None:
+            continue
+        if isinstance(logs, str | Path | Log | Staged) or is_columns(logs):
+            logs = [logs]
+        if not isinstance(logs, Iterable):
+            refuse_others(logs)
+        sources += [open_source(log, role, profile) for log in logs]
+    lengths = Counter(source.promised for source in sources if source.digest)
+    kept: list[Recording] = []
+    seen: dict[str, dict[Role, Recording]] = {}
+    for source in sources:
+        if source.digest is not None and lengths[source.promised] > 1:
+            twins = seen.setdefault(source.digest(), {})
+            if source.role in twins:
+                numbers = {"case": "twice", "name": source.name}
+                twins[source.role].notices += (Notice("SAME_LOG", numbers=numbers),)
+                continue
+            for twin in twins.values():
+                numbers = {"case": "loaded", "name": source.name, "twin": twin.name}
+                source.notices += (Notice("SAME_LOG", numbers=numbers),)
+            twins[source.role] = source
+        kept.append(source)
+    return kept
 
 
 class Recordings:
@@ -96,6 +229,7 @@ class Recordings:
     logs : the logs, unloaded ones first
     progress : callable
         Called with the stage and how many samples of how many it has gone over.
+    gravity, effort : as in `Settings`, for the named checks
 
     Raises
     ------
@@ -103,7 +237,13 @@ class Recordings:
         If torques of two logs come from one file: they were not recorded at once.
     """
 
-    def __init__(self, logs: Sequence[Recording], progress: Progress | None = None) -> None:
+    def __init__(
+        self,
+        logs: Sequence[Recording],
+        progress: Progress | None = None,
+        gravity: float = 9.81,
+        effort: str | None = None,
+    ) -> None:
         owners: dict[str, str] = {}
         for log in logs:
             file = log.origin.reading.torque_file
@@ -115,6 +255,7 @@ class Recordings:
                 )
         self.logs = tuple(logs)
         self.progress = progress
+        self._gravity, self._effort = gravity, effort
         self._limits: dict[Role, tuple[Limit, ...]] = {}
         self._known: dict[Role, Saturation] = {}
         self._recorded: dict[Recording, list[Recorded]] = {}
@@ -138,6 +279,12 @@ class Recordings:
     def accepted(self) -> set[str]:
         """Codes of what the user says is right in some log."""
         return {code for log in self.logs for code in log.origin.reading.accepted}
+
+    def _weight(self, log: Recording) -> float:
+        """Gravity in m/s² in a log's torque; no driver compensates for that of a payload."""
+        if self._effort in ("gravity-compensated", "external") and log.role == "unloaded":
+            return 0.0
+        return self._gravity
 
     def begin(self, stage: str, logs: Sequence[Recording] | None = None) -> None:
         """The passes from here on are over `logs`, by default all, and of that stage."""
@@ -197,7 +344,7 @@ class Recordings:
                 known = [one for one in logs if one in self._recorded]
                 if known:
                     parts = [(one.origin, self._recorded.pop(one)) for one in known]
-                    mended = mends(parts, gravity=known[0].weight > 0)
+                    mended = mends(parts, gravity=self._weight(known[0]) > 0)
                     self._conventions |= {
                         one: notice
                         for one, notice in zip(known, mended, strict=True)
@@ -283,8 +430,8 @@ class Recordings:
         alike = [one for one in self.logs if one.role == log.role]
         found = examine(
             begin,
-            cache(partial(judged, begin, gravity=log.weight > 0)),
-            effort=log.effort,
+            cache(partial(judged, begin, gravity=self._weight(log) > 0)),
+            effort=self._effort,
             whole=whole,
             alone=len(alike) == 1,
             known=self._known[log.role],
@@ -307,9 +454,9 @@ class Recordings:
                 for block, alone in islice(_with_end(other), 1):
                     other._begin = block if alone else None  # so that it is not read again
                     begins[other] = block if alone else block.part(0, EXAMINED)
-        known = saturation(*begins.values(), gravity=log.weight, effort=log.effort)
+        known = saturation(*begins.values(), gravity=self._weight(log), effort=self._effort)
         self._known[log.role], self._limits[log.role] = known, known.limits
-        if len(alike) > 1 and log.effort != "external":
+        if len(alike) > 1 and self._effort != "external":
             for one, samples in begins.items():
                 self._recorded[one] = recorded(samples, seconds_of_each(len(alike)))
 

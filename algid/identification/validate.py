@@ -11,8 +11,7 @@ from algid.base.text import ABSENT, file_name, visible
 from algid.estimators.prediction import CUTOFF, FILTER, PredictionScore, score
 from algid.estimators.rollout import HORIZONS, RolloutScore, rollouts
 from algid.identification.known import as_logged, model_of, reused, shift_of, torque_constants
-from algid.identification.open_logs import LogLike, open_source
-from algid.identification.recordings import Recordings, Role
+from algid.identification.recordings import LogLike, Recordings, Role, open_source
 from algid.identification.series import Predictor, torque_blocks
 from algid.results import Result, TorquePrediction
 from algid.table4 import finite
@@ -198,8 +197,8 @@ def predicted(result: Result, log: LogLike, role: Role, profile: Profile | None)
     file = result.log.path
     profile = reused(profile, result, file)
     known = predictor_of(as_logged(result, profile), file)
-    source = open_source(log, role, profile, known.model.gravity)
-    blocks = list(torque_blocks(Recordings([source]), known))
+    source = open_source(log, role, profile)
+    blocks = list(torque_blocks(Recordings([source], gravity=known.model.gravity), known))
     if not blocks:
         return pl.DataFrame()
     return pl.concat(map(pl.DataFrame, blocks), rechunk=True).drop("log")

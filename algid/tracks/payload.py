@@ -26,9 +26,8 @@ from algid.base.errors import LogError
 from algid.base.files import read_whole
 from algid.base.runtime import one_blas_thread
 from algid.estimators.problem import TooShortError
-from algid.identification.known import as_logged, contradictions, reused
-from algid.identification.open_logs import LogLike, open_source, read_otherwise
-from algid.identification.recordings import Recordings
+from algid.identification.known import as_logged, contradictions, read_otherwise, reused
+from algid.identification.recordings import LogLike, Recordings, open_source
 from algid.notices import Notice, lossy, merged
 from algid.results import Result, read_result, result_json
 from algid.signals.segments import Segment
@@ -98,8 +97,8 @@ def track_log(
         result = read_result(file)
         content = read_whole(file / "result.json" if file.is_dir() else file)
     profile = reused(profile, result, called)
-    source = open_source(log, "loaded", profile, profile.gravity, changing=True)
-    survey = Recordings([source])
+    source = open_source(log, "loaded", profile, changing=True)
+    survey = Recordings([source], gravity=profile.gravity)
     first = next(survey.segments(source), None)
     if first is None:
         raise LogError(f"{source.name}: it holds no samples; record longer")

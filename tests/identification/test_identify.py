@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 import algid
 from algid.base.errors import LogError
 from algid.identification.identify import identify
-from algid.identification.open_logs import open_source
+from algid.identification.recordings import open_source
 from algid.log import Log
 from algid.profile import Profile
 from algid.results import Status, read_result, result_schema

@@ -20,14 +20,13 @@ from algid.estimators.terms import Selection
 from algid.identification import checks
 from algid.identification.by_likelihood import Fitted
 from algid.identification.checks import Check, doubted, fit_notes, remarks
-from algid.identification.open_logs import open_source
 from algid.identification.outcome import (
     estimate,
     outcome_of,
     table_rows,
     unknown,
 )
-from algid.identification.recordings import Recordings
+from algid.identification.recordings import Recordings, open_source
 from algid.identification.validate import prediction
 from algid.log import Log, Origin
 from algid.model import RIGID

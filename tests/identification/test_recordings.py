@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 
 from algid.base.errors import LogError
-from algid.identification.open_logs import (
+from algid.identification.recordings import (
+    Recording,
+    Recordings,
     Staged,
     open_source,
     open_sources,
 )
-from algid.identification.recordings import Recording, Recordings
 from algid.log import Log, Origin, Truth
 from algid.synth.cases import load_case
 from algid.writers import write_log
@@ -120,16 +121,15 @@ def test_twins_count_once_and_others_of_their_length_stay() -> None:
     one, other = moving("one.csv"), moving("other.csv", payload=0.0)
     bent = replace(moving("bent.csv"), tau=one.tau + 1e-12)
     third = moving("third.csv")
-    kept = open_sources([one, bent, other, third], None, None, 9.81)
+    kept = open_sources([one, bent, other, third], None)
     assert [source.name for source in kept] == ["one.csv", "bent.csv"]
     assert [(notice.code, notice.numbers["name"]) for notice in kept[0].notices] == [
         ("SAME_LOG", "other.csv"),
         ("SAME_LOG", "third.csv"),
     ]
     assert kept[1].notices == ()
-    assert open_sources(None, None, None, 9.81) == []
-    assert [source.name for source in open_sources(iter([one]), None, None, 1.6)] == ["one.csv"]
-    assert open_sources(one, None, None, 1.6)[0].gravity == 1.6
+    assert open_sources(None, None) == []
+    assert [source.name for source in open_sources(iter([one]), None)] == ["one.csv"]
 
 
 @pytest.mark.parametrize(("cuts", "alone"), [([], True), ([599], False), ([300], False)])

@@ -19,8 +19,7 @@ from algid.estimators.combine import LogInformation
 from algid.estimators.innovations import residual_sums
 from algid.estimators.prediction import score
 from algid.identification.by_likelihood import Fitted
-from algid.identification.open_logs import open_source
-from algid.identification.recordings import Recordings
+from algid.identification.recordings import Recordings, open_source
 from algid.identification.series import (
     START_KEY,
     Predictor,

@@ -13,9 +13,8 @@ from algid.arm import FloatArray
 from algid.identification import recordings as surveys
 from algid.identification.by_likelihood import choose_model, run_fit
 from algid.identification.by_paper import run_paper
-from algid.identification.open_logs import open_source
 from algid.identification.outcome import judged, outcome_of
-from algid.identification.recordings import Recording, Recordings
+from algid.identification.recordings import Recording, Recordings, open_source
 from algid.log import Log
 from algid.results import Result
 from algid.settings import Settings

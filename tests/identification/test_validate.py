@@ -12,8 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from algid.arm import FloatArray, forward_dynamics, inverse_dynamics, with_payload
 from algid.identification.identify import identify
-from algid.identification.open_logs import open_source
-from algid.identification.recordings import Recordings, Role
+from algid.identification.recordings import Recordings, Role, open_source
 from algid.identification.series import Predictor
 from algid.identification.validate import predictor_of, validate
 from algid.log import Log, Origin

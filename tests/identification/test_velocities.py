@@ -11,9 +11,8 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.base.errors import LogError
-from algid.identification.open_logs import open_source
 from algid.identification.passes import with_velocities
-from algid.identification.recordings import Recordings
+from algid.identification.recordings import Recordings, open_source
 from algid.log import Log, Origin
 from algid.settings import Settings
 from algid.signals.filters import differentiator, half_length

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from algid.identification.open_logs import open_sources
-from algid.identification.recordings import Recordings
+from algid.identification.recordings import Recordings, open_sources
 from algid.inspection.channels import saturation
 from algid.inspection.checks import inspect_log
 from algid.log import Log
@@ -25,7 +24,7 @@ def cut_off() -> Log:
 
 
 def surveyed(log: Log) -> Recordings:
-    return Recordings(open_sources(log, None, None, 9.81))
+    return Recordings(open_sources(log, None))
 
 
 def told(survey: Recordings) -> list[str]:
