@@ -58,52 +58,33 @@ class Limits:
 
     Parameters
     ----------
-    low, high : rad; a joint has both or neither
-    speed : rad/s
-    acceleration : rad/s^2
-    torque : N m
+    middle : (2,), rad
+        Of the range; hanging where there is none.
+    allowed : by name, how far it may go to either side
+        Range from its middle in rad, speed in rad/s, acceleration in rad/s², torque in N m.
     height : float, m
         Lowest height of the tip over joint 1; minus infinity where there is none.
     lengths : (2,), m
         Of the links; NaN where they are not known.
     """
 
-    low: FloatArray
-    high: FloatArray
-    speed: FloatArray
-    acceleration: FloatArray
-    torque: FloatArray
+    middle: FloatArray
+    allowed: Mapping[str, FloatArray]
     height: float
     lengths: FloatArray
 
     @property
-    def middle(self) -> FloatArray:
-        """Middle (2,) of the range; hanging where there is none."""
-        middle = np.array(HANGING)
-        bounded = np.isfinite(self.half)
-        middle[bounded] = 0.5 * (self.low[bounded] + self.high[bounded])
-        return middle
-
-    @property
-    def half(self) -> FloatArray:
-        """Half the width (2,) of the range; infinite where there is none."""
-        return 0.5 * (self.high - self.low)
+    def ends(self) -> tuple[FloatArray, FloatArray]:
+        """The lowest and the highest angles (2,)."""
+        return self.middle - self.allowed["range"], self.middle + self.allowed["range"]
 
     def within(self, margin: float) -> Limits:
         """These limits less a share `margin` of each."""
-        taken = np.where(np.isfinite(self.half), margin * self.half, 0.0)
         height = self.height
         if np.isfinite(height):
             height += margin * (self.lengths.sum() - height)
-        return replace(
-            self,
-            low=self.low + taken,
-            high=self.high - taken,
-            speed=(1 - margin) * self.speed,
-            acceleration=(1 - margin) * self.acceleration,
-            torque=(1 - margin) * self.torque,
-            height=height,
-        )
+        allowed = {name: (1 - margin) * limit for name, limit in self.allowed.items()}
+        return replace(self, allowed=allowed, height=height)
 
     def height_of(self, theta: FloatArray) -> FloatArray:
         """Height of the tip (...) in m at angles (2, ...)."""
@@ -216,13 +197,15 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
             f"{height:g} m"
         )
     low, high = asked.range.T
-    limits = Limits(low, high, asked.speed, asked.acceleration, asked.torque, height, lengths)
-    every = np.stack([limits.half, limits.speed, limits.acceleration, limits.torque])
-    if not np.any(np.isfinite(every)):
+    allowed = {"range": 0.5 * (high - low), "speed": asked.speed}
+    allowed |= {"acceleration": asked.acceleration, "torque": asked.torque}
+    middle, bounded = np.array(HANGING), np.isfinite(high)
+    middle[bounded] = 0.5 * (low[bounded] + high[bounded])
+    if not np.any(np.isfinite([*allowed.values()])):
         raise SettingError(
             f"{flag('range')}: without any limit no motion is the best, found inf for all; give one"
         )
-    return limits
+    return Limits(middle, allowed, height, lengths)
 
 
 @dataclass(frozen=True)
@@ -295,18 +278,16 @@ def usage(
     """
     uses = list(_kinematic(limits, slopes.motion))
     for load in loads:
-        uses += _torque(limits.torque, slopes, load, derivatives)
+        uses += _torque(limits.allowed["torque"], slopes, load, derivatives)
     rows, values, by_motion = zip(*uses, strict=True)
     return Usage(rows, np.array(values), np.array(by_motion) if derivatives else None)
 
 
 def _kinematic(limits: Limits, motion: Motion) -> Iterator[_Use]:
-    kinds = (
-        ("range", motion.theta - limits.middle[:, None], limits.half),
-        ("speed", motion.omega, limits.speed),
-        ("acceleration", motion.alpha, limits.acceleration),
-    )
-    for order, (name, values, limit) in enumerate(kinds):
+    kinds = {"range": motion.theta - limits.middle[:, None], "speed": motion.omega}
+    kinds["acceleration"] = motion.alpha
+    for order, (name, values) in enumerate(kinds.items()):
+        limit = limits.allowed[name]
         for joint in np.flatnonzero(np.isfinite(limit)).tolist():
             for sign in (1.0, -1.0):
                 slope = np.zeros((COMPONENTS, values.shape[1]))
@@ -349,10 +330,9 @@ def resting(limits: Limits, model: Model, loads: Sequence[Load]) -> FloatArray:
     SettingError
         If there is none; it names the limit, and by how much it is missed.
     """
-    middle = limits.middle
-    low = np.where(np.isfinite(limits.low), limits.low, middle - _WIDE)
-    high = np.where(np.isfinite(limits.high), limits.high, middle + _WIDE)
-    first, second = np.linspace(low, high, _STEPS, axis=1)
+    half = limits.allowed["range"]
+    reach = np.where(np.isfinite(half), half, _WIDE)
+    first, second = np.linspace(limits.middle - reach, limits.middle + reach, _STEPS, axis=1)
     theta = np.stack([np.repeat(first, _STEPS), np.tile(second, _STEPS)])
     still = Motion(theta, np.zeros_like(theta), np.zeros_like(theta))
     used = usage(limits, Sensitivities(model, still, 1.0), loads, derivatives=False)

@@ -20,6 +20,7 @@ ends with is drawn back to the resting start until it keeps every limit exactly.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
@@ -185,7 +186,14 @@ def optimise(
         # SLSQP asks for the figure, the limits and their gradients at one x after another
         @lru_cache(maxsize=1)
         def evaluated(key: bytes) -> Evaluation:
-            return _evaluated(campaign, np.frombuffer(key), stage, rows)
+            x = np.frombuffer(key)
+            with suppress(np.linalg.LinAlgError):
+                found = campaign.evaluate(x, stage)
+                if np.isfinite(found.figure) and np.all(np.isfinite(found.room)):
+                    return found
+            # a step so long that nothing can be said of the motion is one to be shortened
+            room = np.full(rows, -_HOPELESS)
+            return Evaluation(_HOPELESS, np.zeros(x.size), room, np.zeros((rows, x.size)))
 
         def at(x: FloatArray) -> Evaluation:
             return evaluated(x.tobytes())
@@ -247,21 +255,6 @@ def kept(campaign: Campaign, x: FloatArray, rate: float, most: float = 1.0) -> F
         else:
             high = middle
     return rest + low * (x - rest)
-
-
-def _evaluated(campaign: Campaign, x: FloatArray, stage: Stage, rows: int) -> Evaluation:
-    """The evaluation of `x`, of `rows` limits.
-
-    A step so long that nothing can be said of the motion is one to be shortened.
-    """
-    try:
-        found = campaign.evaluate(x, stage)
-        if np.isfinite(found.figure) and np.all(np.isfinite(found.room)):
-            return found
-    except np.linalg.LinAlgError:
-        pass
-    room = np.full(rows, -_HOPELESS)
-    return Evaluation(_HOPELESS, np.zeros(x.size), room, np.zeros((rows, x.size)))
 
 
 def soft_maximum(u: FloatArray, hardness: float) -> tuple[FloatArray, FloatArray]:

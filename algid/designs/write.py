@@ -119,13 +119,11 @@ def design_json(design: Planned) -> str:
         "interrupted": design.interrupted,
         "noise": {name: float(level) for name, level in noise.items()},
         "gravity": experiment.shared.model.gravity,
-        "parameters": {name: _parameter(design, place) for place, name in enumerate(design.names)},
+        "parameters": _parameters(design),
         "largest_relative_bound": design.largest,
         "limits": {
-            "range": [_finite(limits.low), _finite(limits.high)],
-            "speed": _finite(limits.speed),
-            "acceleration": _finite(limits.acceleration),
-            "torque": _finite(limits.torque),
+            **{name: _finite(limit) for name, limit in limits.allowed.items()},
+            "range": [_finite(np.round(end, 12)) for end in limits.ends],
             "tip_height": limits.height if np.isfinite(limits.height) else None,
             "margin": campaign.margin,
         },
@@ -136,19 +134,22 @@ def design_json(design: Planned) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _parameter(design: Planned, place: int) -> dict[str, Any]:
-    """What is believed of a parameter, and the error bars that the campaign will give it."""
-    asked = design.campaign.asked
-    return {
-        "believed": float(design.campaign.belief.mean[place]),
-        "believed_std": float(design.campaign.belief.std[place]),
-        "std": float(design.std[place]),
-        "relative": float(design.relative[place]) if asked.known[place] else None,
-        "worst_std": float(design.worst[place]),
-        "unit": UNITS[design.names[place]],
-        "asked": bool(asked.wanted[place]),
-        "information_by_second": [round(float(share), 4) for share in design.shares[place]],
-    }
+def _parameters(design: Planned) -> dict[str, dict[str, Any]]:
+    """By name what is believed of a parameter, and the error bars that the campaign will give."""
+    asked, belief = design.campaign.asked, design.campaign.belief
+    facts = {}
+    for place, name in enumerate(design.names):
+        facts[name] = {
+            "believed": float(belief.mean[place]),
+            "believed_std": float(belief.std[place]),
+            "std": float(design.std[place]),
+            "relative": float(design.relative[place]) if asked.known[place] else None,
+            "worst_std": float(design.worst[place]),
+            "unit": UNITS[name],
+            "asked": bool(asked.wanted[place]),
+            "information_by_second": [round(float(share), 4) for share in design.shares[place]],
+        }
+    return facts
 
 
 def _finite(values: FloatArray) -> list[float | None]:
@@ -208,17 +209,17 @@ def _arm(design: Planned) -> ArmDrawing | None:
 
 def bound_table(design: Planned) -> Table:
     """Every parameter with the error bar that the campaign will give it."""
-    asked = design.campaign.asked
-    mean = design.campaign.belief.mean
     rows = []
-    for place, name in enumerate(design.names):
-        std, worst = design.std[place], design.worst[place]
+    for (name, one), size in zip(
+        _parameters(design).items(), design.campaign.asked.size, strict=True
+    ):
         shares = [ABSENT, ABSENT]
-        if asked.known[place]:
-            shares = [percent(one, asked.size[place]) for one in (std, worst)]
-        numbers = (resolved(float(mean[place]), float(std)), significant(float(std), 2))
-        wanted = _YES[bool(asked.wanted[place])]
-        rows.append((name, *numbers, unit_text(UNITS[name]), shares[0], wanted, shares[1]))
+        if one["relative"] is not None:
+            shares = [percent(one[std], size) for std in ("std", "worst_std")]
+        numbers = (resolved(one["believed"], one["std"]), significant(one["std"], 2))
+        rows.append(
+            (name, *numbers, unit_text(one["unit"]), shares[0], _YES[one["asked"]], shares[1])
+        )
     kinds = zip(design.campaign.experiment.runs, ("unloaded", "loaded"), strict=True)
     runs = " and ".join(counted(count, f"{kind} run") for count, kind in kinds if count)
     note = (
@@ -284,13 +285,14 @@ def verdict(design: Planned) -> Verdict:
 def motion(design: Planned) -> Panels:
     """Angles, velocities and torques of both joints over time, with their limits."""
     limits, planned = design.campaign.limits, design.motion
+    allowed = limits.allowed
     series = {
-        "Angles, rad": (planned.theta, limits.low, limits.high),
-        "Velocities, rad/s": (planned.omega, -limits.speed, limits.speed),
+        "Angles, rad": (planned.theta, *limits.ends),
+        "Velocities, rad/s": (planned.omega, -allowed["speed"], allowed["speed"]),
     }
     for loaded, torque in design.torque.items():
         kind = {True: "loaded", False: "unloaded"}[loaded]
-        series[f"Torques, {kind}, N m"] = (torque, -limits.torque, limits.torque)
+        series[f"Torques, {kind}, N m"] = (torque, -allowed["torque"], allowed["torque"])
     panels = Panels("motion", list(series))
     every = max(1, design.t.size // DRAWN)
     for place, (values, *sides) in enumerate(series.values()):

@@ -112,7 +112,7 @@ def open_source(
     """
     from algid.readers import open_log
 
-    name = str(log)
+    name = None
     if isinstance(log, Staged):
         name, log = log.url, log.path
     elif not isinstance(log, Log):
@@ -132,7 +132,7 @@ def open_source(
             return read if 0 < reader.rows <= SHORT else ahead(read)
 
         digest = cache(partial(sha256_of, path))
-        source = Recording(name, role, reader.origin, blocks, reader.rows, digest)
+        source = Recording(name or str(log), role, reader.origin, blocks, reader.rows, digest)
     truth = source.origin.truth
     if truth is None or changing:
         return source

@@ -76,17 +76,20 @@ def design() -> Planned:
 
 def test_no_limit_breaks_for_any_arm_that_is_believed_possible(design: Planned) -> None:
     limits, motion, belief = design.campaign.limits, design.motion, design.campaign.belief
-    assert np.all(motion.theta >= limits.low[:, None])
-    assert np.all(motion.theta <= limits.high[:, None])
-    assert np.all(np.abs(motion.omega) <= limits.speed[:, None])
-    assert np.all(np.abs(motion.alpha) <= limits.acceleration[:, None])
+    away = motion.theta - limits.middle[:, None]
+    for name, values in {
+        "range": away,
+        "speed": motion.omega,
+        "acceleration": motion.alpha,
+    }.items():
+        assert np.all(np.abs(values) <= limits.allowed[name][:, None])
     heights = 0.1626 * np.sin(motion.theta[0]) + 0.1232 * np.sin(motion.theta.sum(axis=0))
     assert heights.min() >= -0.27
     for arm in belief.draws(100, seed=123):
         for loaded in (False, True):
             k = belief.shared.coefficients(arm, loaded)
             torque = inverse_dynamics(k, motion.theta, motion.omega, motion.alpha)
-            assert np.all(np.abs(torque) <= limits.torque[:, None])
+            assert np.all(np.abs(torque) <= limits.allowed["torque"][:, None])
 
 
 def test_what_is_asked_for_is_what_becomes_certain(design: Planned) -> None:
@@ -97,7 +100,9 @@ def test_what_is_asked_for_is_what_becomes_certain(design: Planned) -> None:
 
 
 def test_the_json_holds_what_decides_and_what_is_predicted(design: Planned) -> None:
-    limits = replace(design.campaign.limits, acceleration=np.full(2, np.inf), height=-np.inf)
+    limits = design.campaign.limits
+    allowed = {**limits.allowed, "acceleration": np.full(2, np.inf)}
+    limits = replace(limits, allowed=allowed, height=-np.inf)
     asked = replace(design.campaign.asked, known=np.arange(10) != 6)
     decided_by = replace(
         design.campaign,
@@ -115,10 +120,10 @@ def test_the_json_holds_what_decides_and_what_is_predicted(design: Planned) -> N
         *(__version__, ["a", "b"], {"unloaded": 1, "loaded": 1}),
     ]
     assert content["noise"] == {"theta1": 1e-3, "theta2": 1e-3, "tau1": 1e-2, "tau2": 1e-2}
-    allowed = content["limits"]
-    np.testing.assert_allclose(allowed["range"], [[-np.pi / 2 - 1.2, -1.2], [1.2 - np.pi / 2, 1.2]])
-    assert (allowed["speed"], allowed["torque"]) == ([3.0, 3.0], [1.9, 0.95])
-    assert (allowed["acceleration"], allowed["tip_height"]) == ([None, None], None)
+    told = content["limits"]
+    np.testing.assert_allclose(told["range"], [[-np.pi / 2 - 1.2, -1.2], [1.2 - np.pi / 2, 1.2]])
+    assert (told["speed"], told["torque"]) == ([3.0, 3.0], [1.9, 0.95])
+    assert (told["acceleration"], told["tip_height"]) == ([None, None], None)
     motion = {"range": design.motion.theta, "speed": design.motion.omega}
     for limit, signal in motion.items():
         rows = [row for row in content["used"] if row["limit"] == limit]

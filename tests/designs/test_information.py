@@ -92,15 +92,10 @@ def test_gradient_by_the_motion_is_that_of_differences() -> None:
 
 
 def limits_for(belief: Belief) -> Limits:
-    return Limits(
-        low=np.array([-2.8, -1.2]),
-        high=np.array([-0.4, 1.4]),
-        speed=np.array([3.0, 2.0]),
-        acceleration=np.array([30.0, np.inf]),
-        torque=np.array([2.0, 1.0]),
-        height=-0.28,
-        lengths=belief.mean[-2:],
-    )
+    allowed = {"range": [1.2, 1.3], "speed": [3.0, 2.0], "acceleration": [30.0, np.inf]}
+    allowed["torque"] = [2.0, 1.0]
+    arrays = {name: np.array(limit) for name, limit in allowed.items()}
+    return Limits(np.array([-1.6, 0.1]), arrays, height=-0.28, lengths=belief.mean[-2:])
 
 
 def test_usage_derivatives_are_those_of_differences() -> None:

@@ -15,24 +15,26 @@ from algid.designs.information import Sensitivities
 from algid.designs.limits import Limits, resting, usage
 from algid.model import Model, Motion
 
-FREE = Limits(
-    low=np.full(2, -np.inf),
-    high=np.full(2, np.inf),
-    speed=np.full(2, np.inf),
-    acceleration=np.full(2, np.inf),
-    torque=np.full(2, np.inf),
-    height=-np.inf,
-    lengths=np.array([0.4, 0.3]),
-)
-TIGHT = replace(
-    FREE,
-    low=np.array([-2.0, -1.0]),
-    high=np.array([0.0, 3.0]),
-    speed=np.array([2.0, 4.0]),
-    acceleration=np.array([10.0, 20.0]),
-    torque=np.array([5.0, 2.5]),
-    height=-0.3,
-)
+ALLOWED = {
+    "range": np.array([1.0, 2.0]),
+    "speed": np.array([2.0, 4.0]),
+    "acceleration": np.array([10.0, 20.0]),
+    "torque": np.array([5.0, 2.5]),
+}
+TIGHT = Limits(np.array([-1.0, 1.0]), ALLOWED, height=-0.3, lengths=np.array([0.4, 0.3]))
+
+
+def but(
+    height: float = -np.inf, middle: float | None = None, **allowed: float | list[float]
+) -> Limits:
+    """Those limits with others in place of some."""
+    changed = {
+        name: np.broadcast_to(np.array(one, dtype=float), 2) for name, one in allowed.items()
+    }
+    own = TIGHT.middle if middle is None else np.array([middle, 0.0])
+    return replace(TIGHT, middle=own, allowed=ALLOWED | changed, height=height)
+
+
 K = np.array([0.05, 1.0, 0.03, 4.0, 0.2, 0.3, 0.2])
 
 
@@ -99,7 +101,7 @@ def test_the_torque_is_that_of_the_worst_arm_on_either_side(box: bool) -> None:
 
 def test_a_weak_arm_rests_where_it_needs_least() -> None:
     loads = [load(0.05 * np.diag(K), box=True)]
-    weak = replace(TIGHT, torque=np.array([3.0, 2.5]), height=-np.inf)
+    weak = but(torque=[3.0, 2.5])
     rest = resting(weak, Model(), loads)
     grid = np.stack(
         np.meshgrid(np.linspace(-2, 0, 41), np.linspace(-1, 3, 41), indexing="ij")
@@ -117,13 +119,7 @@ def test_a_weak_arm_rests_where_it_needs_least() -> None:
 
 
 def test_what_no_posture_keeps_is_named_with_what_it_misses() -> None:
-    high = replace(
-        TIGHT,
-        height=0.5,
-        torque=np.full(2, np.inf),
-        low=np.array([-2.0, -0.1]),
-        high=np.array([-0.5, 0.1]),
-    )
+    high = but(0.5, -1.25, range=[0.75, 0.1], torque=np.inf)
     with pytest.raises(SettingError) as refused:
         resting(high, Model(), [])
     best = 0.4 * np.sin(-0.5) + 0.3 * np.sin(-0.4)
@@ -132,12 +128,11 @@ def test_what_no_posture_keeps_is_named_with_what_it_misses() -> None:
         "--set tip_height: even at rest, wherever within --range, tip height, takes "
         f"{share:.4g} % of its limit (margin included); allow more, or move or widen --range"
     )
-    flat = replace(TIGHT, height=-np.inf, low=np.array([-0.1, -0.1]), high=np.array([0.1, 0.1]))
     least = 100 * (4 * np.cos(0.1) + np.cos(0.2)) / 3.0
     for loaded in (False, True):
         arm = load(np.zeros((7, 1)), box=True, loaded=loaded)
         with pytest.raises(SettingError) as refused:
-            resting(replace(flat, torque=np.array([3.0, 9.0])), Model(), [arm])
+            resting(but(middle=0.0, range=0.1, torque=[3.0, 9.0]), Model(), [arm])
         words = "loaded" if loaded else "unloaded"
         assert str(refused.value).startswith(
             f"--torque: even at rest, wherever within --range, torque, {words} of joint 1, up, "
