@@ -17,6 +17,7 @@ from algid.arm import (
     with_payload,
 )
 from algid.synth.cases import load_case
+from tests.exports.arms import states
 
 PAYLOAD = 0.35
 
@@ -47,15 +48,6 @@ def lagrangian_torque() -> Callable[..., list[float]]:
     return sp.lambdify((*plain, *symbols), flat, "numpy")
 
 
-def states(count: int = 200) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    draw = np.random.default_rng(7)
-    return (
-        draw.uniform(-6, 6, (2, count)),
-        draw.normal(0, 5, (2, count)),
-        draw.normal(0, 50, (2, count)),
-    )
-
-
 def physical(arm: Arm) -> tuple[float, ...]:
     return (arm.m1, arm.m2, arm.lc1, arm.lc2, arm.l1, arm.l2, arm.I1, arm.I2, arm.b1, arm.b2, arm.g)
 
@@ -66,7 +58,7 @@ def test_inverse_dynamics_is_the_lagrangian_s(
     case: str, payload: float, lagrangian_torque: Callable[..., list[float]]
 ) -> None:
     arm = load_case(case).arm
-    theta, omega, alpha = states()
+    theta, omega, alpha = states(200)
     k = with_payload(arm.constants(), arm.payload_constants(payload))
     expected = np.array(lagrangian_torque(*alpha, *omega, *theta, *physical(arm), payload))
     # rounding of sums of terms up to 1 N m
@@ -75,7 +67,7 @@ def test_inverse_dynamics_is_the_lagrangian_s(
 
 def test_forward_dynamics_inverts_inverse_dynamics() -> None:
     k = load_case("case1").arm.constants()
-    theta, omega, alpha = states()
+    theta, omega, alpha = states(200)
     tau = inverse_dynamics(k, theta, omega, alpha)
     # the mass matrix has a condition number of about 10
     np.testing.assert_allclose(

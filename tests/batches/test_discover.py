@@ -25,6 +25,11 @@ def _touch(folder: Path, *names: str) -> None:
         (folder / name).write_text("x")
 
 
+def named(*sources: str, out: str = "out") -> list[str]:
+    """The names of the jobs that sources hold."""
+    return [job.name for job in jobs_of(sources, out)]
+
+
 def test_unloaded_and_loaded_logs_pair_up(tmp_path: Path) -> None:
     _touch(
         tmp_path,
@@ -44,12 +49,12 @@ def test_unloaded_and_loaded_logs_pair_up(tmp_path: Path) -> None:
 
 def test_results_and_hidden_files_are_passed_over(tmp_path: Path) -> None:
     _touch(tmp_path, "a.mcap", "a.algid/torque.parquet", "out/jobs.parquet", "out/b.csv", ".c.csv")
-    assert [job.name for job in jobs_of([str(tmp_path)], str(tmp_path / "out"))] == ["a"]
+    assert named(str(tmp_path), out=str(tmp_path / "out")) == ["a"]
 
 
 def test_a_glob_and_a_file_name_jobs_by_their_stems(tmp_path: Path) -> None:
     _touch(tmp_path, "x/a.mcap", "y/b.mcap")
-    assert [job.name for job in jobs_of([str(tmp_path / "*/*.mcap")], "out")] == ["a", "b"]
+    assert named(str(tmp_path / "*/*.mcap")) == ["a", "b"]
     (job,) = jobs_of([str(tmp_path / "x/a.mcap")], "out")
     assert job == Job("a", logs=(str(tmp_path / "x/a.mcap"),))
     (job,) = jobs_of([str(tmp_path / "x/a.mcap")], "out", alone="loaded")
@@ -125,7 +130,7 @@ def test_a_pattern_of_two_stars_goes_through_folders_and_not_through_results(
         ("*.txt", ["f.txt"]),
         ("**/f.*", ["f.txt"]),
     ):
-        assert [job.name for job in jobs_of([str(tmp_path / pattern)], "out")] == names, pattern
+        assert named(str(tmp_path / pattern)) == names, pattern
     for absent in ("**/*.bag", "absent*.csv"):
         with pytest.raises(SettingError, match="no such file, folder or match"):
             jobs_of([f"{tmp_path}/{absent}"], "out")
@@ -154,9 +159,8 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
     assert first.time == "2026-01-31T12:00:00+00:00"
 
 
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
+BAD = {
+    "m.csv": [
         ("name,logs\n../x,a.csv\n", "row 1.name: a job's name becomes a folder's"),
         ("name,logs\nx,\n", "row 1: expected logs, or loaded ones"),
         ("name,logs,time\nx,a.csv,yesterday\n", "row 1.time: expected ISO 8601"),
@@ -169,16 +173,7 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
         ("name,logs\nx,a,b,c\n", "row 1.cells beyond the header: expected text.*found .'b', 'c'."),
         ("name,logs\ny,a.csv\nx,a\0.csv\n", "row 2.logs.0: "),
     ],
-)
-def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told: str) -> None:
-    (tmp_path / "m.csv").write_text(text)
-    with pytest.raises(SettingError, match=rf"^{tmp_path}/m\.csv: {told}"):
-        jobs_of([str(tmp_path / "m.csv")], "out")
-
-
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
+    "m.toml": [
         ("", r"expected tables \[\[job\]\] alone, found none"),
         (f"more = 1\n{JOB}", r"expected tables \[\[job\]\] alone, found more"),
         ("[[job]]\nname = 'x'\nlogs = 5", "job 1.logs: expected a valid list, found 5"),
@@ -187,13 +182,18 @@ def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told:
         (f"{JOB}payload = 0x1{'0' * 5000}", "job 1.payload: expected text, a date, .*, found "),
         (f"{JOB}payload = {{a = 1}}", "job 1.payload: .* found {'a': 1}"),
     ],
+}
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "told"), [(file, *one) for file, rows in BAD.items() for one in rows]
 )
-def test_a_bad_manifest_in_toml_is_refused_by_its_place(
-    tmp_path: Path, text: str, told: str
+def test_a_bad_manifest_is_refused_by_its_place(
+    tmp_path: Path, file: str, text: str, told: str
 ) -> None:
-    (tmp_path / "m.toml").write_text(text)
-    with pytest.raises(SettingError, match=rf"^{tmp_path}/m\.toml: {told}"):
-        jobs_of([str(tmp_path / "m.toml")], "out")
+    (tmp_path / file).write_text(text)
+    with pytest.raises(SettingError, match=rf"^{tmp_path / file}: {told}"):
+        jobs_of([str(tmp_path / file)], "out")
 
 
 def test_a_manifest_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
@@ -285,13 +285,13 @@ def test_a_bag_is_one_log_and_its_folder_no_place_to_look_in(tmp_path: Path) -> 
 
 def test_the_table_of_results_is_no_log_where_results_go_and_one_elsewhere(tmp_path: Path) -> None:
     _touch(tmp_path, "jobs.parquet", "a.csv", "sub/jobs.parquet")
-    assert [job.name for job in jobs_of([str(tmp_path)], str(tmp_path))] == ["a", "sub/jobs"]
-    assert [job.name for job in jobs_of([str(tmp_path)], "out")] == ["a", "jobs", "sub/jobs"]
+    assert named(str(tmp_path), out=str(tmp_path)) == ["a", "sub/jobs"]
+    assert named(str(tmp_path)) == ["a", "jobs", "sub/jobs"]
 
 
 def test_a_source_that_is_given_twice_counts_once(tmp_path: Path) -> None:
     _touch(tmp_path, "a.csv", "b.csv")
-    assert [job.name for job in jobs_of([str(tmp_path), str(tmp_path / "a.csv")], "out")] == [
+    assert named(str(tmp_path), str(tmp_path / "a.csv")) == [
         "a",
         "b",
     ]

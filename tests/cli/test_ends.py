@@ -20,7 +20,7 @@ from algid.api.batch import answer
 from algid.api.options import stem_of
 from algid.base.errors import SettingError
 from algid.batches.jobs import Job, JobRecord, JobStatus
-from algid.batches.run import Batch, Batched
+from algid.batches.run import Batched
 from algid.cli.output import shown
 from algid.designs.prior import PriorKnowledge, noise_for, prior_of
 from algid.estimators.whitening import NoiseLevels
@@ -74,59 +74,6 @@ def test_a_batch_says_what_became_of_its_jobs(
         printed = capsys.readouterr()
         assert printed.out.splitlines() == ([] if quiet else lines)
         assert printed.err == ("" if ended.stopped is None else f"algid: {ended.stopped}\n")
-
-
-class Watched:
-    """A batch that stops after some looks, and hears what it is given to run."""
-
-    def __init__(self, looks: int) -> None:
-        self.heard: list[tuple[list[Any], bool]] = []
-        self.looks = looks
-        self.stop = SimpleNamespace(is_set=lambda: self.looks == 0, wait=self.look)
-
-    def look(self, _seconds: float) -> None:
-        self.looks -= 1
-
-    def run(self, jobs: list[Any], retry_failed: bool = False) -> Batched:
-        self.heard.append((jobs, retry_failed))
-        return Batched([GOOD] * len(self.heard), len(jobs), 0)
-
-
-def logged(name: str) -> Any:
-    return SimpleNamespace(name=name, trouble="", logs=(name,), loaded=())
-
-
-def test_a_watch_complains_once_and_retries_what_failed_once(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    looks: list[Any] = [
-        SettingError("logs: gone"),
-        SettingError("logs: gone"),
-        [logged("a")],
-        [logged("a")],
-        SettingError("twice"),
-        [logged("b")],
-        [logged("b")],
-    ]
-
-    def look() -> Any:
-        found = looks.pop(0)
-        if isinstance(found, SettingError):
-            raise found
-        return found
-
-    def seen(path: str) -> Any:
-        if path == "b":  # whoever reads it says why
-            raise SettingError(f"{path}: it cannot be looked at")
-        return SimpleNamespace(size=1)
-
-    monkeypatch.setattr("algid.batches.run.stat_of", seen)
-    running: Any = Watched(7)
-    heard: list[str] = []
-    ended = Batch.watch(running, look, True, heard.append)
-    assert running.heard == [([], False), ([logged("a")], True), ([logged("b")], False)]
-    assert len(ended.records) == 3
-    assert heard == ["logs: gone", "twice"]
 
 
 def test_results_are_named_by_their_folders(tmp_path: Path) -> None:

@@ -116,7 +116,7 @@ def test_limits_are_a_pair_of_joints_and_infinite_where_none_is_told() -> None:
     low, high = limits.ends
     np.testing.assert_allclose(low, [-np.pi / 2 - 1.2, -0.7])
     np.testing.assert_allclose(high, [-np.pi / 2 + 1.2, 0.7])
-    expected = {"range": [1.2, 0.7], "speed": [3, 3], "torque": [5, 0.5]}
+    expected = {"range": [1.2, 0.7], "speed": [3.0, 3.0], "torque": [5.0, 0.5]}
     for name, one in (expected | {"acceleration": [np.inf, np.inf]}).items():
         np.testing.assert_allclose(limits.allowed[name], one)
     assert limits.height == -np.inf

@@ -17,18 +17,10 @@ from algid.model import (
     torque,
 )
 from tests.estimators.test_model import VALUES
+from tests.exports.arms import states
 
 WITHOUT_LAG = tuple(term for term in TERMS if term != "lag")
 MODELS = [(), *((term,) for term in WITHOUT_LAG), ("coulomb", "stribeck", "asymmetry"), WITHOUT_LAG]
-
-
-def _states(seed: int = 0, count: int = 400) -> tuple[FloatArray, FloatArray, FloatArray]:
-    rng = np.random.default_rng(seed)
-    return (
-        rng.uniform(-3, 3, (2, count)),
-        rng.normal(0, 2, (2, count)),
-        rng.normal(0, 40, (2, count)),
-    )
 
 
 def _constants(model: Model) -> FloatArray:
@@ -39,7 +31,7 @@ def _constants(model: Model) -> FloatArray:
 @pytest.mark.parametrize("terms", MODELS, ids=lambda terms: "+".join(terms) or "plain")
 def test_accelerations_are_those_whose_torque_it_is(terms: tuple[str, ...], gravity: float) -> None:
     model = Model(terms, gravity, coulomb_speed=0.5)
-    theta, omega, alpha = _states()
+    theta, omega, alpha = states(400)
     c = _constants(model)
     found = acceleration(model, c, theta, omega, torque(model, c, Motion(theta, omega, alpha)))
     # the mass matrix has a condition number of about 10
@@ -52,7 +44,7 @@ def test_a_load_whose_sign_turns_is_found_from_either_side() -> None:
     """
     model = Model(("load",), coulomb_speed=0.1)
     c = np.array([*_constants(Model()), 0.3, 0.3])
-    theta, omega, _ = _states(2, 2000)
+    theta, omega, _ = states(2000)
     alpha = np.random.default_rng(3).normal(0, 2, theta.shape)
     tau = torque(model, c, Motion(theta, omega, alpha))
     kept = tau.copy()

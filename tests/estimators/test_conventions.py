@@ -101,6 +101,16 @@ def test_a_right_log_is_right(bench: Bench) -> None:
         assert found.best.convention == AS_READ
 
 
+@pytest.mark.parametrize("signs", [(1, 1), (1, -1)])
+def test_an_arm_without_weight_tells_its_signs(bench: Bench, signs: tuple[int, int]) -> None:
+    k = bench.arm.constants() * np.array([1, 0, 1, 0, 1, 1, 1])
+    theta, tau = measured(simulate(k, wide_multi_sine(bench.arm, 3), np.arange(4001) * DT))
+    mistake = Convention(torque_signs=signs)
+    found = judge_together([Recorded(theta, mistake.torques(tau), DT)], gravity=False)
+    assert found.alone
+    assert found.best.convention == mistake
+
+
 def wrongs(motion: SimulatedMotion) -> dict[str, Callable[[], Pair]]:
     """What real arms and sensors do to a log whose convention is right."""
     theta, tau = measured(motion, 0.0)

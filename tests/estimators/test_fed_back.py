@@ -17,7 +17,8 @@ from algid.estimators.problem import WeakSettings
 from algid.signals.segments import Segment
 from algid.signals.shift import TorqueShift
 from algid.synth.cases import load_case
-from pipelines.simulator import Controller, Plan, controlled
+from pipelines.accuracy_scenes import waves
+from pipelines.simulator import Controller, Plan, controlled, inertias
 from tests.estimators.conftest import problem_of
 
 RATE, SECONDS, NOISE = 1000.0, 8.0, 2e-3
@@ -27,14 +28,13 @@ RATE, SECONDS, NOISE = 1000.0, 8.0, 2e-3
 def follower() -> Segment:
     """Case 1's arm behind a digital PD controller whose encoders are noisy."""
     k = load_case("case1").arm.constants()
-    stiffness = 2 * np.pi * 4.0
-    inertia = np.array([k[4] + k[2] + 2 * k[0], k[2]])
+    stiffness, inertia = 2 * np.pi * 4.0, inertias(k)
     gains = inertia * stiffness**2, 1.4 * inertia * stiffness
     count = round(SECONDS * RATE)
     t = np.arange(2 * count - 1) / (2 * RATE)
-    turn = 2 * np.pi * np.array([[0.4, 1.1, 1.9], [0.6, 1.3, 2.3]])[:, :, None]
-    theta = 0.4 * np.sin(turn * t).sum(axis=1) - np.array([[np.pi / 2], [0.0]])
-    omega = 0.4 * (turn * np.cos(turn * t)).sum(axis=1)
+    turns = np.array([[0.4, 1.1, 1.9], [0.6, 1.3, 2.3]])
+    theta, omega, _ = waves(t, turns, np.full((2, 3), 0.4), np.zeros((2, 3)))
+    theta[0] -= np.pi / 2
     weight = np.stack([k[3] * np.cos(theta[0]), 0 * t]) + k[1] * np.cos(theta.sum(axis=0))
     rng = np.random.default_rng(3)
     controller = Controller(*gains, digital=True, seen=NOISE)

@@ -13,8 +13,8 @@ from algid.estimators.problem import WeakSettings
 from algid.estimators.refined import likeliest_width
 from algid.model import Model
 from algid.signals.segments import Segment
-from pipelines.accuracy_scenes import random_arm
-from pipelines.simulator import WIDTH, Controller, Plan, controlled
+from pipelines.accuracy_scenes import random_arm, waves
+from pipelines.simulator import WIDTH, Controller, Plan, controlled, inertias
 from tests.estimators.conftest import problem_of
 
 SEED = 415  # an arm that nothing was tuned on
@@ -24,16 +24,10 @@ def rubbing() -> tuple[Segment, FloatArray]:
     """Three seconds behind a PD controller, friction of a tenth of the weight; k1 … k7, f1, f2."""
     k, count, rng = random_arm(SEED)[0].constants(), 3001, np.random.default_rng(SEED)
     fine = np.arange(2 * count - 1) / 2000.0
-    theta, omega = np.zeros((2, fine.size)), np.zeros((2, fine.size))
-    theta[0] = -np.pi / 2
-    for joint, frequencies in enumerate(([0.5, 1.3], [0.7, 1.9])):
-        for w in 2 * np.pi * np.array(frequencies):
-            theta[joint] += 0.4 * np.sin(w * fine)
-            omega[joint] += 0.4 * w * np.cos(w * fine)
-    inertia, friction = (
-        np.array([k[4] + k[2] + 2 * k[0], k[2]]),
-        0.1 * np.array([k[3] + k[1], k[1]]),
-    )
+    turns = np.array([[0.5, 1.3], [0.7, 1.9]])
+    theta, omega, _ = waves(fine, turns, np.full((2, 2), 0.4), np.zeros((2, 2)))
+    theta[0] -= np.pi / 2
+    inertia, friction = inertias(k), 0.1 * np.array([k[3] + k[1], k[1]])
     plan = Plan(theta, omega, np.zeros_like(theta))
     law = Controller(600 * inertia, 35 * inertia)
     angles, torques, _ = controlled(k, plan, law, friction, 1000.0, rng)

@@ -4,7 +4,9 @@ down.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,8 @@ from algid.arm import FloatArray
 from algid.estimators.combine import LogInformation
 from algid.estimators.fit import Fit
 from algid.estimators.parametrisation import Shared
+from algid.identification.recordings import Recording, open_source
+from algid.log import Log
 from algid.model import Model
 from algid.synth.cases import load_case
 
@@ -59,6 +63,12 @@ def fit_of(
         logs=tuple(logs),
     )
     return replace(made, **changes)
+
+
+def in_blocks(log: Log, cuts: Iterable[int]) -> Recording:
+    """The log as a recording whose blocks begin at these samples."""
+    blocks = [log.part(first, last) for first, last in pairwise([0, *cuts, len(log)])]
+    return replace(open_source(log, "unloaded"), blocks=lambda: iter(blocks), promised=0)
 
 
 def with_values(fit: Fit, **values: float) -> Fit:

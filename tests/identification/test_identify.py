@@ -206,21 +206,11 @@ def test_constrain_obeys_every_bound(change: str, noisy: tuple[Log, Log]) -> Non
 def test_a_log_whose_lost_samples_were_renumbered_has_failed_unless_it_is_accepted() -> None:
     log, _ = algid.synthesise("case1", duration=4.0, torque="wide", sensors=Sensors(1e-4, 1e-3))
     kept = np.random.default_rng(5).random(len(log)) > 0.05
-    some = int(kept.sum())
-    lost = replace(
-        log,
-        stamp_ns=log.stamp_ns[:some],
-        theta=log.theta[:, kept],
-        tau=log.tau[:, kept],
-        omega=None,
-    )
+    lost = Log.from_arrays(log.t[: kept.sum()], log.theta[:, kept], log.tau[:, kept])
     found = algid.identify(lost, report=False, settings=WEAK)
     assert found.verdict.grade == "failed"
     assert not any(one.status is Status.OK for one in found.parameters.values())
-    reading = replace(lost.origin.reading, accepted=("LOST_SAMPLES",))
-    accepted = algid.identify(
-        replace(lost, origin=replace(lost.origin, reading=reading)), report=False, settings=WEAK
-    )
+    accepted = algid.identify(lost, report=False, settings=WEAK, accept=("LOST_SAMPLES",))
     assert any(one.status is Status.OK for one in accepted.parameters.values())
     assert any("LOST_SAMPLES" in warning for warning in accepted.warnings)
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,6 @@ import pytest
 
 from algid.base.errors import LogError
 from algid.identification.recordings import (
-    Recording,
     Recordings,
     Staged,
     open_source,
@@ -23,6 +21,7 @@ from algid.identification.recordings import (
 from algid.log import Log, Origin, Truth
 from algid.synth.cases import load_case
 from algid.writers import write_log
+from tests.identification.fits import in_blocks
 
 ARM = load_case("case1").arm
 
@@ -37,12 +36,6 @@ def moving(
     stamps = 5_000_000_000 + np.arange(samples) * 1_000_000
     came = Origin(name, "csv", {}, truth, **origin)  # type: ignore[arg-type]
     return Log(stamps, theta, 3 * np.cos(theta), came)
-
-
-def in_blocks(log: Log, cuts: list[int], promised: int = 0) -> Recording:
-    ends = [0, *cuts, len(log)]
-    blocks = [log.part(first, last) for first, last in pairwise(ends)]
-    return replace(open_source(log, "unloaded"), blocks=lambda: iter(blocks), promised=promised)
 
 
 @pytest.mark.parametrize(

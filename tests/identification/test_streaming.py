@@ -14,11 +14,12 @@ from algid.identification import recordings as surveys
 from algid.identification.by_likelihood import choose_model, run_fit
 from algid.identification.by_paper import run_paper
 from algid.identification.outcome import judged, outcome_of
-from algid.identification.recordings import Recording, Recordings, open_source
+from algid.identification.recordings import Recording, Recordings
 from algid.log import Log
 from algid.results import Result
 from algid.settings import Settings
 from algid.synth.sensors import Sensors
+from tests.identification.fits import in_blocks
 
 SETTINGS = {
     "weak": Settings(estimator="weak"),
@@ -27,16 +28,6 @@ SETTINGS = {
     "paper": Settings(estimator="paper"),
     "paper, zero phase": Settings(estimator="paper", observer="zero-phase"),
 }
-
-
-def chopped(log: Log, rows: int) -> Recording:
-    """A log that comes in blocks of `rows` samples."""
-    starts = range(0, len(log), rows)
-
-    def blocks() -> Iterator[Log]:
-        return (log.part(first, min(first + rows, len(log))) for first in starts)
-
-    return replace(open_source(log, "unloaded"), blocks=blocks, promised=0)
 
 
 @pytest.fixture(scope="module")
@@ -73,8 +64,8 @@ def estimates(log: Recording, settings: Settings) -> tuple[FloatArray, FloatArra
 @pytest.mark.parametrize("name", SETTINGS)
 def test_blocks_do_not_show_in_the_estimates(name: str, uneven: Log) -> None:
     settings = SETTINGS[name]
-    whole, room, result = estimates(chopped(uneven, len(uneven)), settings)
-    cut, _, streamed = estimates(chopped(uneven, 2049), settings)
+    whole, room, result = estimates(in_blocks(uneven, []), settings)
+    cut, _, streamed = estimates(in_blocks(uneven, range(2049, len(uneven), 2049)), settings)
     assert np.all(np.abs(cut - whole) < room)
     assert streamed.log == result.log
     if result.fit is not None and result.fit.residual is not None:
@@ -88,7 +79,7 @@ def test_logs_that_fit_in_memory_are_read_once(
 ) -> None:
     monkeypatch.setattr(surveys, "MOST_KEPT", room)
     begun: list[int] = []
-    log = chopped(uneven, 5000)
+    log = in_blocks(uneven, range(5000, len(uneven), 5000))
 
     def blocks() -> Iterator[Log]:
         begun.append(1)
@@ -107,7 +98,7 @@ def test_logs_that_fit_in_memory_are_read_once(
 
 
 def test_a_pass_that_ends_early_is_not_taken_for_the_whole_log(uneven: Log) -> None:
-    log = chopped(uneven, 5000)
+    log = in_blocks(uneven, range(5000, len(uneven), 5000))
     survey = Recordings([log])
     next(survey.segments(log))
     assert sum(map(len, survey.segments(log))) == sum(map(len, Recordings([log]).segments(log)))

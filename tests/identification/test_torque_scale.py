@@ -19,7 +19,7 @@ from algid.arm import FloatArray, with_payload
 from algid.base.errors import SettingError
 from algid.estimators import refined
 from algid.identification.identify import identify
-from algid.log import ChannelReading, Log, Origin, Reading
+from algid.log import ChannelReading, Log, Reading
 from algid.notices import Notice
 from algid.results import Result, read_result
 from algid.results.verdict import again
@@ -29,6 +29,7 @@ from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
 from algid.writers import write_log
+from pipelines.accuracy_scenes import logged
 from tests.cli.commands import call
 from tests.estimators.conftest import problem_of
 from tests.intervals import distances, holds_95, in_axes
@@ -47,11 +48,9 @@ def moved(*, loaded: bool) -> SimulatedMotion:
 
 def currents(*, loaded: bool, seed: int = 0) -> Log:
     """A log in amperes of motors with `CONSTANT`, read with a torque constant of 1."""
-    motion = moved(loaded=loaded)
-    noise = np.random.default_rng([seed, loaded]).standard_normal((2, *motion.theta.shape))
-    stamps = np.round(motion.t * 1e9).astype(np.int64)
-    tau = (motion.tau + 1e-2 * noise[1]) / CONSTANT
-    return Log(stamps, motion.theta + 1e-3 * noise[0], tau, Origin(f"{loaded}.csv", "csv", {}))
+    motion, rng = moved(loaded=loaded), np.random.default_rng([seed, loaded])
+    sigmas = 1e-3, 1e-2 / CONSTANT
+    return logged(motion.t, motion.theta, motion.tau / CONSTANT, rng, sigmas)
 
 
 def test_a_known_payload_tells_the_gain_of_the_torques() -> None:

@@ -4,19 +4,18 @@ stretch by stretch.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from algid.arm import FloatArray
 from algid.base.errors import LogError
 from algid.identification.passes import with_velocities
-from algid.identification.recordings import Recordings, open_source
+from algid.identification.recordings import Recordings
 from algid.log import Log, Origin
 from algid.settings import Settings
 from algid.signals.filters import differentiator, half_length
 from algid.signals.segments import Segment, append
+from tests.identification.fits import in_blocks
 
 DT = 1e-3
 BANDWIDTH = 60.0
@@ -32,8 +31,7 @@ def log_at(stamps: FloatArray, omega: FloatArray | None = None) -> Log:
 
 def observed(log: Log, rows: int, *, luenberger: bool = False, **settings: object) -> list[Segment]:
     """The log, read in blocks of `rows` samples, with velocities: each stretch in one segment."""
-    blocks = [log.part(first, min(first + rows, len(log))) for first in range(0, len(log), rows)]
-    source = replace(open_source(log, "unloaded"), blocks=lambda: iter(blocks), promised=0)
+    source = in_blocks(log, range(rows, len(log), rows))
     whole: list[Segment] = []
     wanted = Settings(bandwidth=BANDWIDTH).but(**settings)
     for part in with_velocities(Recordings([source]), source, wanted, luenberger=luenberger):

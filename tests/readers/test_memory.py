@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pyarrow as pa
-import pyarrow.feather as feather
-import pyarrow.parquet as pq
 import pytest
 import zstandard
-from scipy.io import savemat
 
 from algid.arm import FloatArray
 from tests.readers.large import WRITERS as MESSAGES
 from tests.readers.large import peak_of_reading
+from tests.readers.ways import store, store_table
 
 MOST_BYTES = 600e6
 """What reading 1e7 samples may take."""
@@ -32,22 +31,18 @@ ROW = 50  # bytes of a row of text, which polars unpacks whole where it is packe
 Columns = dict[str, FloatArray]
 
 
-def _packed_npz(path: Path, columns: Columns) -> None:
-    np.savez_compressed(path, **columns)  # type: ignore[arg-type]
-
-
 WRITERS: dict[str, Callable[[Path, Columns], object]] = {
     "csv": lambda path, columns: pl.DataFrame(columns).write_csv(path, float_precision=6),
     "csv.zst": lambda path, columns: path.write_bytes(
         zstandard.compress(pl.DataFrame(columns).write_csv(float_precision=6).encode(), 1)
     ),
-    "parquet": lambda path, columns: pq.write_table(pa.table(columns), path),
-    "feather": lambda path, columns: feather.write_feather(pa.table(columns), str(path)),
+    "parquet": lambda path, columns: store_table(path, pa.table(columns)),
+    "feather": lambda path, columns: store_table(path, pa.table(columns)),
     "one.feather": lambda path, columns: pl.DataFrame(columns).write_ipc(path),
-    "npz": lambda path, columns: np.savez(path, **columns),  # type: ignore[arg-type]
-    "packed.npz": _packed_npz,
-    "mat": lambda path, columns: savemat(path, columns),
-    "packed.mat": lambda path, columns: savemat(path, columns, do_compression=True),
+    "npz": store,
+    "packed.npz": partial(store, packed=True),
+    "mat": store,
+    "packed.mat": partial(store, packed=True),
 }
 
 

@@ -27,7 +27,7 @@ FINITE = st.floats(-1e29, 1e29, allow_subnormal=True)
 
 @settings(max_examples=25, deadline=None)
 @given(
-    values=arrays(np.float64, (2, 2, 5), elements=FINITE),
+    values=arrays(np.float64, (4, 2, 5), elements=FINITE),
     steps=arrays(np.int64, 5, elements=st.integers(1, 10**15)),
     kind=st.sampled_from(FORMATS),
 )
@@ -36,12 +36,14 @@ def test_any_finite_log_survives(
     steps: np.ndarray[tuple[int, ...], np.dtype[np.int64]],
     kind: str,
 ) -> None:
-    log = Log(np.cumsum(steps), values[0], values[1], Origin("", "", {}))
+    theta, tau, omega, reference = values
+    log = Log(np.cumsum(steps), theta, tau, Origin("", "", {}), omega, reference=reference)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"log.{kind}"
         write_log(path, log)
         found = read_log(path)
     assert same(found, log)
+    assert np.array_equal(found.reference, log.reference)
 
 
 def test_recorded_mcap_and_csv_of_one_run_agree(shared_data: Path) -> None:

@@ -14,7 +14,6 @@ from algid.base.ros2 import HEADER
 from algid.log import Log, Origin
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
-from algid.writers import FORMATS, write_log
 from tests.readers.mcaps import Cdr, messages_of, write_mcap
 
 T = 0.01 * np.arange(300)
@@ -134,21 +133,6 @@ def test_one_that_wraps_follows_its_angle() -> None:
     made = columns(names, T, np.mod(turning, 2 * np.pi), TAU, np.mod(asked, 2 * np.pi))
     found = reference(read(made, theta1={"unwrap": True}))
     assert found[0] == pytest.approx(turning[0] + 0.1)
-
-
-@pytest.mark.parametrize("kind", FORMATS)
-@pytest.mark.parametrize("velocity", [False, True])
-def test_writers_keep_it_to_the_last_bit(kind: str, velocity: bool, tmp_path: Path) -> None:
-    stamps = (1_700_000_000 * 10**9 + np.arange(300) * 10_000_000).astype(np.int64)
-    omega = TAU if velocity else None
-    log = Log(stamps, THETA, TAU, Origin("", "", {}), omega, reference=REFERENCE)
-    path = tmp_path / f"log.{kind}"
-    write_log(path, iter([log.part(0, 100), log.part(100, 300)]))
-    found = read_log(path)
-    assert np.array_equal(reference(found), REFERENCE)
-    assert np.array_equal(found.theta, THETA)
-    assert (found.omega is not None) == velocity
-    assert found.notices == ()
 
 
 @pytest.mark.parametrize("field", ["reference", "desired"])

@@ -13,7 +13,7 @@ import zstandard
 from algid.api.guide import text_of
 from algid.base.errors import LogError
 from algid.readers import read_log
-from algid.readers.dialect import Dialect, detect, looks_like_text, split
+from algid.readers.dialect import Dialect, detect, looks_like_text
 from algid.readers.formats import FORMATS, SUFFIXES, format_of
 
 CONTENT = {
@@ -114,25 +114,7 @@ def test_text_of_other_encodings_is_refused() -> None:
             detect(Path("log.csv"), "\ufefft,q1\n".encode(code))
 
 
-def test_the_dialect_of_a_table() -> None:
-    dialect = found(
-        'made by hand\n\n"t" ; q1; "on, off" ;day\n1 ; 2,5;7;2024-01-02 '
-        "03:04:05\n-2;.5;8;2024-01-02T03:04:06\n"
-    )
-    kinds = ["int64", "double", "int64", "timestamp[ns]"]
-    assert dialect.schema.names == ["t", "q1", "on, off", "day"]
-    assert (dialect.separator, dialect.decimal_comma, dialect.skip, dialect.padded) == (
-        ";",
-        True,
-        3,
-        True,
-    )
-    assert [str(kind) for kind in dialect.schema.types] == kinds
-    plain = found("% rate 5\n% t q1\n1 2.5\n2 3\n")
-    assert (plain.schema.names, plain.separator, plain.comment) == (["t", "q1"], "", "%")
-    assert (plain.skip, plain.decimal_comma, plain.padded) == (2, False, True)
-    assert found("t,q1\n1,2\n").decimal_comma is False
-    # a cell more than nineteen digits long is no int64
+def test_a_cell_of_more_than_nineteen_digits_is_no_int64() -> None:
     types = found("t,q1\n12345678901234567890,1\n").schema.types
     assert [str(kind) for kind in types] == ["double", "int64"]
 
@@ -150,11 +132,6 @@ def test_a_row_of_units_and_comments_above_and_below_it() -> None:
     assert (dialect.schema.field("q1").metadata, dialect.skip) == ({b"unit": b"rad"}, 4)
     assert dialect.schema.field("tau1").metadata is None
     assert dialect.said == ("tau1 in mNm", " q1 in deg")
-
-
-def test_cells_in_quotes() -> None:
-    assert split('"a, b" , c,"d ""e"""', ",") == ["a, b", "c", 'd "e']
-    assert split('"a" b', "") == ["a", "b"]
 
 
 def test_each_format_is_one_entry() -> None:

@@ -10,16 +10,7 @@ import pytest
 from algid.arm import FloatArray, mass_matrix
 from algid.exports.formats import exported
 from algid.model import Model
-from tests.exports.arms import ODD, result_of, values_of
-
-
-def states(count: int = 40) -> tuple[FloatArray, FloatArray, FloatArray]:
-    draw = np.random.default_rng(5)
-    return (
-        draw.uniform(-3, 3, (2, count)),
-        draw.normal(0, 4, (2, count)),
-        draw.normal(0, 9, (2, count)),
-    )
+from tests.exports.arms import ODD, result_of, states, values_of
 
 
 def test_mujocos_inertia_and_acceleration_are_alike() -> None:
@@ -28,7 +19,7 @@ def test_mujocos_inertia_and_acceleration_are_alike() -> None:
     model = mujoco.MjModel.from_xml_string(
         exported(result_of(value, Model(("rotor",))), "arm", "mjcf", {})[0]
     )
-    data, (theta, omega, tau) = mujoco.MjData(model), states()
+    data, (theta, omega, tau) = mujoco.MjData(model), states(40)
     k = np.array(list(value.values()))[:7]
     full = np.zeros((2, 2))
     for q, v, u in zip(theta.T, omega.T, tau.T, strict=True):

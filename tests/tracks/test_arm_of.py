@@ -11,6 +11,8 @@ import pytest
 
 import algid
 from algid.base.errors import ResultError
+from algid.exports.description import describe
+from algid.identification.known import by_constants, payload_length
 from algid.results import Result
 from algid.signals.segments import Segment, segments
 from algid.synth.sensors import Sensors
@@ -142,3 +144,27 @@ def test_the_first_length_by_the_constants_comes_with_what_it_shares_with_them(
     np.testing.assert_allclose(
         (found / np.outer(scale, scale))[q], both[q] / scale / scale[q], atol=0.03
     )
+
+
+def with_payload_std(result: Result, std: float) -> Result:
+    l1 = result.payload["l1"]
+    better = l1.model_copy(update={"std": std})
+    return result.model_copy(update={"payload": {**result.payload, "l1": better}})
+
+
+def test_the_better_of_constants_and_payload_is_taken(result: Result, first: Segment) -> None:
+    known = by_constants(result)
+    told = result.payload["l1"].estimate
+    sure = with_payload_std(result, known[1] / 2)
+    unsure = with_payload_std(result, known[1] * 2)
+    assert payload_length(sure) == (told, known[1] / 2)
+    assert payload_length(unsure) is None
+    assert arm_of(sure, first)[0].value("l1") == told
+    assert arm_of(unsure, first)[0].value("l1") == pytest.approx(known[0])
+    lengths = [
+        found.links[0].length
+        for found in (describe(one, "arm", {}, links=True) for one in (sure, unsure))
+        if found.links
+    ]
+    assert lengths == [told, pytest.approx(known[0])]
+    assert arm_of(unsure, first, l1=0.3)[0].value("l1") == 0.3

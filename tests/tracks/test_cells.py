@@ -69,6 +69,7 @@ def test_a_track_is_the_weighted_mean_over_its_neighbourhood_and_its_band_that_o
     log = loaded(0.3)
     found = track(lambda: segments([log]), ARM, NOTHING)
     (stretch,) = found.stretches
+    assert found.tip_equivalent == pytest.approx(CASE.arm.constants()[2] / CASE.arm.l2**2)
     assert found.colour == pytest.approx(1, abs=0.1)
     assert abs(stretch.m_p - 0.3) < 4.5 * stretch.std
     assert np.unique(found.stretch).tolist() == [0.0]
@@ -140,24 +141,6 @@ def test_a_stretchs_status_goes_by_its_deviation_and_its_sign(
     found = judged(Stretch(0.0, 2.0, 0.0, 0.01), Stretch(2.0, 4.0, m_p, std))
     assert found.statuses == [StretchStatus.OK, status]
     assert found.complete is (status is StretchStatus.OK)
-
-
-def test_an_object_is_shaped_like_the_payload_that_was_identified() -> None:
-    """What a kilogram adds to the coefficients, with its offset and its inertia, in the complex
-    form.
-    """
-    model = Model(("phases",))
-    # arg K1 = arg K2: θ1's zero is right
-    k = np.array([0.1, 0.5, 0.2, 0.9, 0.4, 0.1, 0.1, 0.02, 0.1, 0.05])
-    arm = carrier(model, k, 0.4, 0.3, y_p=0.05, J_p=0.07**2)
-    added = dict(zip(model.names, arm.unit.tolist(), strict=True))
-    r = complex(0.3, 0.05)
-    assert added["k3"] == pytest.approx(abs(r) ** 2 + 0.07**2)
-    assert complex(added["k1"], added["k1s"]) == pytest.approx(0.4 * r)
-    assert complex(added["k2"], added["k2s"]) == pytest.approx(9.81 * r)
-    assert complex(added["k4"], added["k4s"]) == pytest.approx(9.81 * 0.4)
-    assert added["k5"] == pytest.approx(0.4**2)
-    assert ARM.tip_equivalent == pytest.approx(CASE.arm.constants()[2] / CASE.arm.l2**2)
 
 
 @pytest.mark.parametrize("name", ["l1", "l2", "y_p", "J_p"])
