@@ -6,6 +6,9 @@ Two logs repeat each other where their velocities are alike: with v of both join
 
 Names of files do not count. The likelihoods of n repeats count as one: each is divided by n,
 and where errors are judged by how logs and stretches scatter, their mean stands for them.
+
+Of two recordings of one motion the noise is another's. Logs whose very samples are those of
+another, in another format or cut out of it, are no second measurement: see `shared_samples`.
 """
 
 from __future__ import annotations
@@ -26,6 +29,10 @@ _LONGEST = 60.0  # s that are compared
 _SHIFT = 5.0  # s, by which two recordings of one motion are started apart by hand
 _LENGTHS = 0.8  # of the longer one: a log that is shorter is no repeat
 
+_PROBES, _RUN = 8, 32  # runs of a log that are looked for, and samples of each
+_DIFFERENT = 8  # values that a run holds at least, else it may stand still
+_ROUNDED = 0.05  # of the median step from sample to sample: what a text format may round off
+
 Groups = tuple[tuple[int, ...], ...]
 """Places of logs that repeat each other; each log is in one group."""
 
@@ -42,6 +49,43 @@ def grouped(unloaded: Sequence[Source], loaded: Sequence[Source]) -> Groups:
         else:
             groups.append((kind, motion, [place]))
     return tuple(tuple(places) for _, _, places in groups)
+
+
+def shared_samples(logs: Sequence[FloatArray]) -> FloatArray:
+    """Share (L, L) of each log's samples that another one holds too, by `_PROBES` runs of it.
+
+    Parameters
+    ----------
+    logs : angles and torques (4, N) of each
+    """
+    every, shares = np.concatenate(logs, axis=1), np.zeros((len(logs), len(logs)))
+    ends = np.cumsum([log.shape[1] for log in logs])
+    sorting: dict[int, NDArray[np.int64]] = {}
+    for own, log in enumerate(logs):
+        if log.shape[1] < _RUN:
+            continue
+        steps = np.median(np.abs(np.diff(log, axis=1)), axis=1)
+        error = (_ROUNDED * steps + 1e-9 * np.abs(log).max(axis=1))[:, None]
+        starts = np.linspace(0, log.shape[1] - _RUN, _PROBES).astype(np.int64)
+        runs = [log[:, start : start + _RUN] for start in starts.tolist()]
+        counts = [[np.unique(row).size for row in run] for run in runs]
+        telling = [number for number, count in enumerate(counts) if max(count) >= _DIFFERENT]
+        for number in telling:
+            # by as few of the rows as tell
+            run, row = runs[number], int(np.argmax(np.minimum(counts[number], _RUN // 2)))
+            if row not in sorting:
+                sorting[row] = np.argsort(every[row])
+            order = sorting[row]
+            bounds = run[row, 0] + error[row] * (-1, 1)
+            first, last = np.searchsorted(every[row], bounds, sorter=order)
+            found = order[first:last]
+            found = found[found <= every.shape[1] - _RUN]
+            found = found[np.all(np.abs(every[:, found] - run[:, :1]) <= error, axis=0)]
+            there = every[:, found[:, None] + np.arange(_RUN)]
+            same = np.all(np.abs(there - run[:, None]) <= error[:, None], axis=(0, 2))
+            holders = np.unique(np.searchsorted(ends, found[same], side="right"))
+            shares[own, holders] += 1 / len(telling)
+    return shares
 
 
 def alike(one: FloatArray, other: FloatArray) -> bool:

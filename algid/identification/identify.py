@@ -150,6 +150,7 @@ def identify(
             f"identify: expected an unloaded log, or a loaded one with {flag('parameters')} or "
             f"{flag('effort')} external, found {alone}"
         )
+    survey.count_once()
     if settings.cross_validate:
         for kind, logs in (("unloaded", survey.unloaded), ("loaded", survey.loaded)):
             if len(logs) == 1:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
@@ -12,6 +11,9 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
+from algid.arm import FloatArray
 from algid.base.errors import LogError
 from algid.base.files import sha256_of
 from algid.base.names import evenly_spread
@@ -33,6 +35,7 @@ EXAMINED = 1 << 15
 """Samples at the start of a long log that the named checks look at."""
 SHORT = 1 << 16
 """Samples of a log that is read and hashed sooner than a thread starts."""
+_WHOLE = 0.9  # of a log's samples: what is left is where it was cut
 MOST_KEPT = 1 << 20
 """Samples of all logs together that stay in memory, 48 bytes each, so that they are read once."""
 
@@ -181,12 +184,7 @@ def open_sources(
     loaded: LogLike | Iterable[LogLike] | None,
     profile: Profile | None = None,
 ) -> list[Recording]:
-    """Sources of one log, several, or none of each role, unloaded ones first: see `open_source`.
-
-    A log that is given twice, byte for byte, counts once, and the first of the two has a notice of
-    the other; a loaded one that is also given as unloaded has a notice of that: its payload is
-    zero. Only logs that promise as many samples as another are hashed for it.
-    """
+    """Sources of one log, several, or none of each role, unloaded ones first: see `open_source`."""
     sources: list[Recording] = []
     both: tuple[tuple[Role, LogLike | Iterable[LogLike] | None], ...]
     both = (("unloaded", unloaded), ("loaded", loaded))
@@ -198,22 +196,7 @@ def open_sources(
         if not isinstance(logs, Iterable):
             refuse_others(logs)
         sources += [open_source(log, role, profile) for log in logs]
-    lengths = Counter(source.promised for source in sources if source.digest)
-    kept: list[Recording] = []
-    seen: dict[str, dict[Role, Recording]] = {}
-    for source in sources:
-        if source.digest is not None and lengths[source.promised] > 1:
-            twins = seen.setdefault(source.digest(), {})
-            if source.role in twins:
-                numbers = {"case": "twice", "name": source.name}
-                twins[source.role].notices += (Notice("SAME_LOG", numbers=numbers),)
-                continue
-            for twin in twins.values():
-                numbers = {"case": "loaded", "name": source.name, "twin": twin.name}
-                source.notices += (Notice("SAME_LOG", numbers=numbers),)
-            twins[source.role] = source
-        kept.append(source)
-    return kept
+    return sources
 
 
 class Recordings:
@@ -290,6 +273,49 @@ class Recordings:
         """The passes from here on are over `logs`, by default all, and of that stage."""
         self._stage, self._words = stage, ""
         self._over = self.logs if logs is None else tuple(logs)
+
+    def count_once(self) -> None:
+        """Leave out each log whose samples another one of its role has too, with a notice of that.
+
+        A log that has some of another's has a notice alone. Of one of more than `MOST_KEPT` samples
+        the first block is looked at.
+        """
+        from algid.estimators.repeats import shared_samples
+
+        if len(self.logs) < 2:
+            return
+        for log in self.logs:
+            if log.promised <= self._room:
+                for _ in self.segments(log):
+                    pass
+        shares = shared_samples([self._samples(log) for log in self.logs])
+        kept: list[int] = []
+        copies: dict[int, list[str]] = {}
+        # the longest first, which hold the others
+        for own in sorted(range(len(self.logs)), key=lambda place: -(self.logs[place].rows or 0)):
+            log = self.logs[own]
+            twin = max(kept, key=lambda other: shares[own, other], default=own)
+            share, other = shares[own, twin], self.logs[twin]
+            if share > _WHOLE and twin != own and log.role == other.role:
+                copies.setdefault(twin, []).append(log.name)
+                continue
+            if twin != own and share > 0:
+                case = "part" if log.role == other.role else "loaded"
+                numbers = {"name": log.name, "twin": other.name, "share": 100 * share}
+                other.notices += (Notice("SAME_LOG", numbers={"case": case, **numbers}),)
+            kept.append(own)
+        for twin, names in copies.items():
+            twice = Notice("SAME_LOG", numbers={"case": "twice", "names": names})
+            self.logs[twin].notices += (twice,)
+        self.logs = tuple(self.logs[place] for place in sorted(kept))
+
+    @staticmethod
+    def _samples(log: Recording) -> FloatArray:
+        """Angles and torques (4, N) of a log, or of its first block."""
+        parts: Sequence[Segment | Log] | None = log._kept
+        if parts is None:
+            parts = [block.part(0, EXAMINED) for block in islice(log.blocks(), 1)]
+        return np.concatenate([np.concatenate([one.theta, one.tau]) for one in parts], axis=1)
 
     def segments(self, log: Recording) -> Iterator[Segment]:
         """A fresh pass over a log: its uniform segments, from its start.

@@ -110,17 +110,27 @@ def test_hashes_are_those_of_the_bytes(tmp_path: Path) -> None:
     assert Recordings([memory]).summary(memory).sha256 == hashlib.sha256(arrays).hexdigest()
 
 
-def test_twins_count_once_and_others_of_their_length_stay() -> None:
-    one, other = moving("one.csv"), moving("other.csv", payload=0.0)
-    bent = replace(moving("bent.csv"), tau=one.tau + 1e-12)
-    third = moving("third.csv")
-    kept = open_sources([one, bent, other, third], None)
-    assert [source.name for source in kept] == ["one.csv", "bent.csv"]
-    assert [(notice.code, notice.numbers["name"]) for notice in kept[0].notices] == [
-        ("SAME_LOG", "other.csv"),
-        ("SAME_LOG", "third.csv"),
-    ]
-    assert kept[1].notices == ()
+def test_no_samples_count_twice_whatever_their_file() -> None:
+    """Copies, rounded as a text format does or cut out, against a second run of the same motion."""
+    rng = np.random.default_rng(0)
+    one, other = moving("one.csv"), moving("other.csv")
+    for log in (one, other):
+        log.tau[:] += 1e-2 * rng.standard_normal(log.tau.shape)
+    rounded = replace(one, tau=np.round(one.tau, 4), origin=replace(one.origin, path="text.csv"))
+    part = one.part(100, len(one) // 2)
+    first, last = one.part(0, 2 * len(one) // 3), one.part(len(one) // 3, len(one))
+
+    def counted(*logs: Log) -> tuple[list[int], list[str]]:
+        survey = Recordings(open_sources(logs, None))
+        survey.count_once()
+        return [log.rows or 0 for log in survey.logs], [
+            notice.key for log in survey.logs for notice in log.notices if notice.code == "SAME_LOG"
+        ]
+
+    assert counted(one, other) == ([len(one), len(other)], [])
+    assert counted(part, one, other, rounded) == ([len(one), len(other)], ["SAME_LOG:twice"])
+    assert counted(first, last) == ([len(first), len(last)], ["SAME_LOG:part"])
+    assert counted(one) == ([0], [])
     assert open_sources(None, None) == []
     assert [source.name for source in open_sources(iter([one]), None)] == ["one.csv"]
 

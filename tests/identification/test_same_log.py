@@ -26,6 +26,7 @@ def test_one_log_as_unloaded_and_as_loaded_is_told_in_one_line(tmp_path: Path) -
         "case": "loaded",
         "name": str(tmp_path / "copy.csv"),
         "twin": str(tmp_path / "one.csv"),
+        "share": 100.0,
     }
 
 
