@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 
@@ -22,7 +23,7 @@ PARAMETERS = Model(FIRST_TERMS).names
 
 
 def read_jobs(path: Path) -> pl.DataFrame:
-    """The finished jobs of ``jobs.parquet``; a number that is none, or beyond all bounds, is null.
+    """The jobs of ``jobs.parquet``; a number that is none, or beyond all bounds, is null.
 
     ``t`` is in months, ``month`` whole, both null without a time.
 
@@ -53,7 +54,7 @@ def read_jobs(path: Path) -> pl.DataFrame:
             t=t,
             month=t.floor().cast(pl.Int32),
         )
-        return jobs.filter(pl.col("status").is_in(["ok", "incomplete"])).collect()
+        return jobs.collect()
     # a panic of polars is no Exception
     except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         reason = str(error).split("\n", maxsplit=1)[0]
@@ -70,7 +71,7 @@ class History:
     roster : a row a robot: robot, logs, undated, first and last (times), latest (job), and
         tested (for drift of anything)
     jobs : every log, the latest of each robot first, as `read_jobs` gives them
-    nameless : logs that name no robot, and are left out
+    nameless, failed : logs that name no robot, and jobs without a result, which are left out
     """
 
     windows: pl.DataFrame
@@ -78,12 +79,14 @@ class History:
     roster: pl.DataFrame
     jobs: pl.DataFrame
     nameless: int = 0
+    failed: int = 0
 
     @property
     def untested(self) -> list[Notice]:
         """What was not looked for, and why."""
         undated, steady = self.roster["undated"].sum(), (~self.roster["tested"]).sum()
-        counts, notices = {"nameless": self.nameless, "undated": undated, "steady": steady}, []
+        counts: dict[str, Any] = {"failed": self.failed, "nameless": self.nameless}
+        counts, notices = counts | {"undated": undated, "steady": steady}, []
         for case, count in counts.items():
             if count:
                 numbers = {"case": case, "count": count, "least": FEWEST, "months": SPAN}
@@ -109,7 +112,8 @@ def history_of(path: Path, progress: Progress | None = None) -> History:
     ResultError
         If it cannot be read, or no finished job has both a robot and parameters.
     """
-    finished = read_jobs(path)
+    every = read_jobs(path)
+    finished = every.filter(pl.col("status").is_in(["ok", "incomplete"]))
     names = [name for name in PARAMETERS if name in finished.columns]
     jobs = finished.filter(pl.col("robot").is_not_null())
     if not finished.height or not names:
@@ -133,4 +137,11 @@ def history_of(path: Path, progress: Progress | None = None) -> History:
     )
     roster = roster.with_columns(tested=pl.col("robot").is_in(tested)).sort("robot")
     listed = jobs.sort("robot", "time", descending=[False, True], nulls_last=True)
-    return History(windows, findings, roster, listed, finished.height - jobs.height)
+    return History(
+        windows,
+        findings,
+        roster,
+        listed,
+        finished.height - jobs.height,
+        every.height - finished.height,
+    )

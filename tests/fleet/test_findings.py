@@ -417,14 +417,15 @@ def test_a_large_fleet_is_cut_and_what_was_not_tested_is_named(tmp_path: Path) -
     jobs = fleet(1, 203, seed=24).with_columns(
         robot=pl.when(pl.col("job") != "j0").then("job"),
         time=pl.when(pl.col("job") != "j1").then("time"),
+        status=pl.when(pl.col("job") != "j2").then("status").otherwise(pl.lit("failed")),
     )
     history = history_in(tmp_path, jobs)
     reasons = verdict(history).reasons
-    told = [("nameless", 1), ("undated", 1), ("steady", 202)]
+    told = [("failed", 1), ("nameless", 1), ("undated", 1), ("steady", 201)]
     assert [(one.case, one.numbers["count"]) for one in reasons] == told
     assert json.loads(history.as_json())["untested"] == [one.text for one in reasons]
     table, plot = robot_table(history), overview(history)
-    assert (len(table.rows), table.note) == (200, "202 robots; the first 200 are shown.")
+    assert (len(table.rows), table.note) == (200, "201 robots; the first 200 are shown.")
     assert table.rows[0] == ("j1", "j1", "1", "not tested", "–", "–")
     assert plot is not None
     assert len(plot.layout["annotations"]) == 12
