@@ -105,7 +105,8 @@ def with_velocities(
             if segment.omega is None:
                 raise LogError(
                     f"{log.name}: expected velocities omega1, omega2 for {flag('velocity')}="
-                    "measured, found none; leave it out to observe them"
+                    "measured, found none; they are observed by "
+                    f"{flag('velocity')}=observer"
                 )
             yield segment
             continue

@@ -75,6 +75,6 @@ def test_a_log_without_velocities_is_refused_in_one_line_that_says_what_to_do() 
         LogError,
         match=r"^walk\.csv: expected velocities omega1, omega2 for --set velocity=measured, found "
         r"none; "
-        r"leave it out to observe them$",
+        r"they are observed by --set velocity=observer$",
     ):
         observed(log_at(np.arange(300.0)), 300, velocity="measured")
