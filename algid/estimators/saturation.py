@@ -33,7 +33,7 @@ from algid.base.quantiles import median
 from algid.estimators.combine import long_run_variance, scaled_pinv
 from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.estimators.problem import WeakSettings
-from algid.estimators.weak import Normal, normal_equations, solve
+from algid.estimators.weak import normal_equations, solve
 from algid.model import FIRST_TERMS, Model
 from algid.signals.segments import Segment, settled
 
@@ -97,18 +97,48 @@ def saturation_of(pieces: Sequence[Segment], gravity: float = 9.81) -> Saturatio
     tau = np.concatenate([piece.tau for piece in pieces], axis=1)
     levels = [one for joint in (0, 1) if (one := _levels(joint, tau[joint])) is not None]
     model = Model(gravity=gravity, terms=FIRST_TERMS)
-    normal = _normal(pieces, model, levels) if levels else None
+
+    def plateaus(piece: Segment, windows: Windows) -> FloatArray:
+        H = []
+        for one in levels:
+            h = windows.torque_moments(_plateaus(piece.tau[one.joint], piece.dt, one))
+            H.append(h * np.equal(np.arange(2), one.joint)[:, None, None])
+        return np.concatenate(H, axis=1)
+
+    normal = None
+    if levels:
+        settings = WeakSettings(model=model, estimate_delay=True)
+        normal = normal_equations(lambda: pieces, settings, beside=plateaus)
     if normal is None:
         return UNSEEN
+    c, (log,) = solve([normal])
+    inverse = scaled_pinv(log.total[0])
+    sandwich = inverse @ long_run_variance(log.g)[0] @ inverse
+    residual, gram = np.append(-c, 1.0), normal.gram.sum(axis=0)
     inertias = [model.names.index(name) for name in _INERTIAS]
     limits, sound = [], set()
-    for number, one in enumerate(levels):
-        plateaus = _plateaus(tau[one.joint], pieces[0].dt, one)
-        cut_off, true = _judged(normal, number, len(levels), one, plateaus, inertias)
-        if cut_off:
+    for number, one in enumerate(levels, -len(levels)):
+        # that of the other joint, if there are two, is beside it
+        own = c.size + 2 * number + np.arange(2)
+        h, total = -c[own], gram[one.joint]
+        covariance, alone = sandwich[np.ix_(own, own)], inverse[np.ix_(own, own)]
+        explained = residual @ total @ residual < (1 - _EXPLAINED) * total[-1, -1]
+        every = np.abs(_plateaus(tau[one.joint], pieces[0].dt, one))
+        mean = every.sum(axis=1) / max(float(every[0].sum()), 1.0)
+        excess, std = float(mean @ h), float(np.sqrt(max(mean @ covariance @ mean, 0.0)))
+        # what h takes off the squares over their variance, beside what it leaves of them
+        taken, left = float(h @ scaled_pinv(alone) @ h), 2.0 / OVERLAP * normal.rows[one.joint]
+        level = max(abs(side) for side in (one.low, one.high) if np.isfinite(side))
+        if (
+            excess > 0
+            and float(h @ scaled_pinv(covariance) @ h) > _CERTAIN**2
+            and taken > _SHARE * (taken + left)
+            and explained
+            and np.all(c[inertias] > 0)
+        ):
             margin = _MARGIN * _noise(tau[one.joint])
             limits.append(replace(one, low=one.low + margin, high=one.high - margin))
-        elif true:
+        elif explained and abs(excess) + _CERTAIN * std < _TRUE * level:
             sound.add(one.joint)
     return Saturation(tuple(limits), frozenset(sound))
 
@@ -122,61 +152,6 @@ def _levels(joint: int, tau: FloatArray) -> Limit | None:
     return Limit(
         joint, low if at_low >= _FEWEST else -np.inf, high if at_high >= _FEWEST else np.inf
     )
-
-
-def _normal(pieces: Sequence[Segment], model: Model, levels: Sequence[Limit]) -> Normal | None:
-    """Normal equations with two columns of h a level, before the torque.
-
-    None where no piece is as long as a window.
-    """
-
-    def plateaus(piece: Segment, windows: Windows) -> FloatArray:
-        H = [
-            windows.torque_moments(_plateaus(piece.tau[one.joint], piece.dt, one)) for one in levels
-        ]
-        own = np.equal.outer([0, 1], np.repeat([one.joint for one in levels], 2))
-        return np.where(own[..., None], np.concatenate(H), 0.0)
-
-    return normal_equations(
-        lambda: pieces, WeakSettings(model=model, estimate_delay=True), beside=plateaus
-    )
-
-
-def _judged(
-    normal: Normal,
-    number: int,
-    count: int,
-    one: Limit,
-    plateaus: FloatArray,
-    inertias: Sequence[int],
-) -> tuple[bool, bool]:
-    """Whether a level cuts off its joint's torque, and whether the motion is sure that it is true.
-
-    That of the other joint, if there are two, is beside it either way.
-    """
-    first = normal.gram.shape[-1] - 1 - 2 * count
-    own = np.arange(first + 2 * number, first + 2 * number + 2)
-    c, (log,) = solve([normal])
-    inverse = scaled_pinv(log.total[0])
-    sandwich = inverse @ long_run_variance(log.g)[0] @ inverse
-    covariance, alone = sandwich[np.ix_(own, own)], inverse[np.ix_(own, own)]
-    h, residual = -c[own], np.append(-c, 1.0)
-    total = normal.gram.sum(axis=0)[one.joint]
-    explained = bool(residual @ total @ residual < (1 - _EXPLAINED) * total[-1, -1])
-    every = np.abs(plateaus)
-    mean = every.sum(axis=1) / max(float(every[0].sum()), 1.0)
-    excess, std = float(mean @ h), float(np.sqrt(max(mean @ covariance @ mean, 0.0)))
-    # what h takes off the squares over their variance, beside what it leaves of them
-    taken, left = float(h @ scaled_pinv(alone) @ h), 2.0 / OVERLAP * normal.rows[one.joint]
-    cut_off = (
-        excess > 0
-        and float(h @ scaled_pinv(covariance) @ h) > _CERTAIN**2
-        and taken > _SHARE * (taken + left)
-        and explained
-        and bool(np.all(c[inertias] > 0))
-    )
-    level = max(abs(side) for side in (one.low, one.high) if np.isfinite(side))
-    return cut_off, explained and abs(excess) + _CERTAIN * std < _TRUE * level
 
 
 def sound(segments: Iterable[Segment], limits: Sequence[Limit]) -> Iterator[Segment]:
