@@ -23,7 +23,7 @@ from algid.base.text import as_toml, counted, joined
 from algid.options import FLAGS, SET, VALUES, flag
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Remedy:
     """Settings that mend what a notice is of, by name: ``zero``, ``tau1.sign``.
 
@@ -73,13 +73,6 @@ class Remedy:
         return " ".join(
             word if _IN_MARKS.fullmatch(word) else shlex.quote(word) for word in self.flags
         )
-
-    def __str__(self) -> str:
-        return f"{self.when}: {self.words}" if self.when else self.words
-
-    def __repr__(self) -> str:
-        text = ", ".join(f"{name}={value!r}" for name, value in self.keywords.items())
-        return text.replace("'", '"')
 
 
 _IN_MARKS = re.compile(r'[\w.]+="[\w ]+"')
@@ -327,10 +320,6 @@ class Verdict:
     reasons: tuple[Notice, ...] = ()
     notes: tuple[Notice, ...] = ()
     command: str | None = None
-
-    def __repr__(self) -> str:
-        codes = ", ".join(codes_of(self.reasons)) or "none"
-        return f"Verdict({self.grade!r}, {self.headline!r}, reasons: {codes})"
 
     @property
     def word(self) -> str:

@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     from algid.batches.run import Batched
     from algid.profile import Profile
     from algid.settings import Settings
-
-UNIT = "jobs"
-"""What progress counts."""
 Size = Annotated[str | int, Option(check=Annotated[ByteSize, Field(ge=1 << 29)])]
 Part = Annotated[str, Field(pattern="^[0-9]{1,9}/[0-9]{1,9}$")]
 Complaint = Callable[[str], None]

@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     from algid.base.progress import Progress
     from algid.designs.campaign import Planned
 
-UNIT = "steps"
-"""What progress counts."""
-
 Noise = Annotated[float, within((1e-12, PHYSICAL.noise[1]))]
 Pair = float | str | Sequence[float]
 Span = float | str | Sequence[float | Sequence[float]]

@@ -127,7 +127,7 @@ def export(
     >>> algid.export(arm, "urdf", l2=0.1667).text.count("<link ")
     4
     """
-    from algid.exports.formats import controller_call, exported
+    from algid.exports.formats import SUFFIXES, controller_call, exported
 
     if to in ("csv", "parquet") and draws is None:
         raise SettingError(f"{flag('to')} {to}: a table of draws; say how many by {flag('draws')}")
@@ -137,7 +137,13 @@ def export(
         raise SettingError(f"{flag('flange')}: {to} holds no flange; leave it out")
     path = None if out is None else Path(out)
     if path == Path() or (path is not None and path.is_dir() and draws is None):
-        path /= file_of(Path(called(result)), to, draws)
+        name = stem_of(Path(called(result)))
+        if draws is not None:
+            path /= f"{name}-draws"
+        elif to == "payload":
+            path /= f"{name}-payload.yaml"
+        else:  # a module of Python is imported by its name
+            path /= (re.sub(r"\W", "_", name) if to == "python" else name) + SUFFIXES[to]
     read, file = opened(result), called(result)
     if draws is not None:
         from algid.exports.draws import drawn_files
@@ -154,23 +160,6 @@ def export(
         with whole_file(path, force=force) as temporary:
             temporary.write_text(text, encoding="utf-8")
     return Exported(text, warnings, path, call=call)
-
-
-def file_of(result: Path, to: str, draws: int | None = None) -> str:
-    """The default file of a result's export: the result's name with the format's suffix.
-
-    Of draws it is a folder.
-    """
-    from algid.exports.formats import SUFFIXES
-
-    stem = stem_of(result)
-    if draws is not None:
-        return f"{stem}-draws"
-    if to == "payload":
-        return f"{stem}-payload.yaml"
-    if to == "python":
-        stem = re.sub(r"\W", "_", stem)
-    return f"{stem}{SUFFIXES[to]}"
 
 
 def answer(made: Exported, _given: Mapping[str, Any]) -> Answer:

@@ -26,10 +26,6 @@ if TYPE_CHECKING:
     from algid.tracks.result import TrackResult
 
 
-UNIT = "passes"
-"""What progress counts."""
-
-
 @verb
 def track(
     log: AnyLog,

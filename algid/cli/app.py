@@ -109,7 +109,7 @@ def command(name: str) -> Command:
         as_json = name in PRINTED and typed.pop("format") == "json"
         given = {key: value for key, value in typed.items() if value not in (None, ())}
         given = getattr(module, "typed", dict)(given | set_by(set, settable))
-        with progress(getattr(module, "UNIT", "samples"), quiet) as bar:
+        with progress(quiet) as bar:
             line = shlex.join(["algid", *sys.argv[1:]])
             callers = {"command": line, "complain": complain, "progress": bar}
             called = {key: value for key, value in callers.items() if key in parameters}

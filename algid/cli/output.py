@@ -83,20 +83,20 @@ def shown(answer: Answer, json: bool, quiet: bool) -> None:
 
 
 @contextmanager
-def progress(unit: str, quiet: bool = False) -> Iterator[Progress | None]:
+def progress(quiet: bool) -> Iterator[Progress | None]:
     """Show a line on standard error while the block runs, if that is a terminal.
 
-    Give what the block is to tell its progress to, None where nobody looks. What is done of each
-    stage is counted in `unit`. The line is gone once the block has ended.
+    Give what the block is to tell its progress to, None where nobody looks. The line is gone once
+    the block has ended.
     """
     if quiet or not sys.stderr.isatty():
         yield None
         return
 
     def shown(stage: str, done: int, total: int) -> None:
-        counts = f"{done:,} {unit}" * (done > 0)
+        counts = f"{done:,}" * (done > 0)
         if total >= max(done, 1):
-            counts = f"{done:,} of {total:,} {unit} ({done / total:.0%})"
+            counts = f"{done:,} of {total:,} ({done / total:.0%})"
         line = f"{printable(stage)}  {counts}"[: shutil.get_terminal_size().columns - 1]
         print(f"{CLEAR}{line}", end="", file=sys.stderr, flush=True)
 
