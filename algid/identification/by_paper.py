@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from functools import partial
-from itertools import islice, zip_longest
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import CONSTANT_NAMES, FloatArray
-from algid.base.errors import LogError
+from algid.base.errors import LogError, SettingError
 from algid.base.names import within
 from algid.estimators.diagnostics import FAR_BEYOND
 from algid.estimators.paper import (
@@ -60,9 +59,17 @@ def run_paper(
     LogError
         If there are several logs of a kind and no other estimator, or if a log is shorter than the
         estimates need to settle, or lacks velocities that were asked for.
+    SettingError
+        If velocities are to come without phase.
     """
+    asked = settles(settings.estimator)
+    if asked and not settings.luenberger and settings.velocity == "observer":
+        raise SettingError(
+            f"{flag('observer')} zero-phase: the paper's method observes as the paper does; leave "
+            f"it out, say {flag('velocity')}=measured, or use {flag('estimator')} refined or weak"
+        )
     for logs in (survey.unloaded, survey.loaded):
-        if settles(settings.estimator) and len(logs) > 1:
+        if asked and len(logs) > 1:
             raise LogError(
                 f"{logs[1].name}: the paper's method takes one log of each kind; give one, or use "
                 f"{flag('estimator')} refined or weak"
@@ -117,7 +124,7 @@ def _estimate(
     window = STAGE1_WINDOW
     if asked and settings.window is not None:
         window = settings.window
-    moving = with_velocities(survey, log, settings, luenberger=settings.luenberger or not asked)
+    moving = with_velocities(survey, log, settings)
     names: Sequence[str]
     if k is None:
         names, file = STAGE1_SERIES, STAGE1_FILE
@@ -179,7 +186,8 @@ def _named(
 ) -> dict[str, Estimate]:
     """Estimates by name; those that are not usable have none, as all have where stage 1 failed."""
     named = {}
-    for name, value, good in islice(zip_longest(names, values, usable), len(names)):
+    for place, name in enumerate(names):
         weak = Estimate(estimate=None, unit=_UNITS[name], status=Status.WEAK_EXCITATION)
-        named[name] = Estimate(estimate=finite(value), unit=_UNITS[name]) if good else weak
+        good = usable[place : place + 1].any()
+        named[name] = Estimate(estimate=finite(values[place]), unit=_UNITS[name]) if good else weak
     return named

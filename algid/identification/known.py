@@ -165,11 +165,7 @@ def torque_constants(result: Result, model: Model, role: Role, file: str) -> Flo
 
 def given_lengths(result: Result) -> dict[str, float]:
     """The link lengths in m that the result was made with."""
-    lengths = {}
-    for name in ("l1", "l2"):
-        if result.settings.get(name) is not None:
-            lengths[name] = result.settings[name]
-    return lengths
+    return Settings.of(result.settings).lengths
 
 
 def wrong_inertia(values: Mapping[str, float]) -> str | None:
@@ -248,6 +244,9 @@ def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice
     What it identified are the payload's lengths, or l1 = g k1 / k2.
     """
     stated, of_arm = given_lengths(result), by_constants(result)
+    identified = {name: (one.estimate, one.std) for name, one in result.payload.items()}
+    if of_arm is not None:
+        identified["l1"] = of_arm[:2]
     notices = []
     for name, given in lengths.items():
         numbers = {"name": name, "given": given}
@@ -256,10 +255,7 @@ def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice
                 numbers |= {"case": "stated", "stated": stated[name]}
                 notices.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
             continue
-        own = result.payload.get(name)
-        estimate, std = (None, None) if own is None else (own.estimate, own.std)
-        if name == "l1" and of_arm is not None:
-            estimate, std, _ = of_arm
+        estimate, std = identified.get(name, (None, None))
         if estimate is None or not std:
             continue
         if said := contradicting(name, given, estimate, std, result.quantile):

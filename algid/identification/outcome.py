@@ -205,6 +205,19 @@ def fit_summary(found: Fitted) -> results.FitSummary:
     if known is not None and "m_p" in fit.names:
         # all that has N m in its unit, m_p too, grows with a common gain of both torques
         gain = _inverse(fit, "m_p", known, "1")
+    whiteness = {}  # empty where no test was made
+    if (tests := fit.whiteness) is not None:
+        for joint in range(2):
+            whiteness[f"tau{joint + 1}"] = results.WhitenessTest(
+                white=tests.joint_white[joint],
+                p_value=finite(float(tests.p_value[joint])),
+                lag1_correlation=float(tests.lag1[joint]),
+            )
+    bounds = []  # of physics that the estimates break beyond their 95 % intervals
+    for one in broken_bounds(fit):
+        if one.distance is None or one.distance > fit.quantile:
+            distance = None if fit.beyond_errors else one.distance
+            bounds.append(results.Bound(bound=one.bound, value=one.value, distance_sigma=distance))
     endogeneity = {}
     if fit.endogeneity is not None:
         # as many coefficients were looked at as a log has (Bonferroni)
@@ -219,7 +232,7 @@ def fit_summary(found: Fitted) -> results.FitSummary:
         intervals=fit.intervals,
         iterations=fit.iterations,
         converged=fit.converged,
-        whiteness=_whiteness(fit),
+        whiteness=whiteness,
         unidentifiable=[one.text for one in fit.unidentifiable],
         model=results.TorqueModel(
             terms=list(chosen.model.terms),
@@ -230,7 +243,7 @@ def fit_summary(found: Fitted) -> results.FitSummary:
         ),
         terms=list(_terms(fit, chosen)),
         torque_hold=_torque_hold(chosen),
-        broken_bounds=_bounds(fit),
+        broken_bounds=bounds,
         endogeneity=endogeneity,
         by_log=by_log,
         residual=prediction(residual),
@@ -242,36 +255,6 @@ def fit_summary(found: Fitted) -> results.FitSummary:
             for name, joint in attributes(fit.shared.model, "elastic")
         },
     )
-
-
-def _whiteness(fit: Fit) -> dict[str, results.WhitenessTest]:
-    """The tests of both joints' residuals; empty where none was made."""
-    tests = fit.whiteness
-    if tests is None:
-        return {}
-    return {
-        f"tau{joint + 1}": results.WhitenessTest(
-            white=tests.joint_white[joint],
-            p_value=finite(float(tests.p_value[joint])),
-            lag1_correlation=float(tests.lag1[joint]),
-        )
-        for joint in range(2)
-    }
-
-
-def _bounds(fit: Fit) -> list[results.Bound]:
-    """Bounds of physics that the estimates break beyond their 95 % intervals."""
-    bounds = []
-    for broken in broken_bounds(fit):
-        distance = broken.distance
-        if distance is not None and not distance > fit.quantile:
-            continue
-        if fit.beyond_errors:
-            distance = None
-        bounds.append(
-            results.Bound(bound=broken.bound, value=broken.value, distance_sigma=distance)
-        )
-    return bounds
 
 
 def _predicted(found: Fitted) -> tuple[PredictionScore, PredictionScore | None]:

@@ -7,8 +7,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from algid.base.errors import LogError
 from algid.estimators.combine import Prior, joined, without
 from algid.estimators.elastic import with_rotors
@@ -18,9 +16,8 @@ from algid.identification.recordings import Recording, Recordings
 from algid.options import flag
 from algid.physics.effort import absent
 from algid.settings import Settings
-from algid.signals.filters import correlate, differentiator, half_length, reflected
 from algid.signals.observers import PAPER_POLES, LuenbergerObserver
-from algid.signals.segments import Segment, settled
+from algid.signals.segments import Segment
 from algid.signals.shift import TorqueShift
 
 
@@ -65,7 +62,7 @@ def problem_of(
     def passed(log: Recording) -> Source:
         moving: Source = partial(survey.segments, log)
         if own:
-            moving = partial(with_velocities, survey, log, settings, luenberger=settings.luenberger)
+            moving = partial(with_velocities, survey, log, settings)
         return moving
 
     known = without(prior, absent(settings.effort, chosen.model.names))
@@ -82,23 +79,14 @@ def problem_of(
     )
 
 
-def with_velocities(
-    survey: Recordings, log: Recording, settings: Settings, *, luenberger: bool
-) -> Iterator[Segment]:
-    """Segments of a log with velocities: measured, by the paper's observer, or differentiated.
+def with_velocities(survey: Recordings, log: Recording, settings: Settings) -> Iterator[Segment]:
+    """Segments of a log with velocities: measured, or by the paper's observer.
 
     Raises
     ------
     LogError
         If measured velocities are asked for and the log has none.
     """
-    if settings.velocity != "measured" and not luenberger:
-        bandwidth = settings.bandwidth
-        for held, first, last in settled(
-            survey.segments(log), lambda dt: half_length(dt, bandwidth)
-        ):
-            yield _derived(held, bandwidth).part(first, last)
-        return
     observer: LuenbergerObserver | None = None
     for segment in survey.segments(log):
         if settings.velocity == "measured":
@@ -114,21 +102,3 @@ def with_velocities(
         if not segment.continues:
             observer.reset()
         yield replace(segment, omega=observer.velocities(segment.theta))
-
-
-def _derived(segment: Segment, bandwidth: float) -> Segment:
-    """The segment with velocities by the zero-phase differentiator.
-
-    Its ends go on by point reflection.
-
-    One that is shorter than half a kernel has differences of neighbours.
-    """
-    reach, theta = half_length(segment.dt, bandwidth), segment.theta
-    if len(segment) > reach:
-        kernel = differentiator(segment.dt, bandwidth)
-        omega = correlate(reflected(theta, reach), kernel)
-    elif len(segment) > 1:
-        omega = np.gradient(theta, segment.dt, axis=1)
-    else:
-        omega = np.zeros_like(theta)
-    return replace(segment, omega=omega)

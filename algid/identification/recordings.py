@@ -239,7 +239,6 @@ class Recordings:
         self.logs = tuple(logs)
         self.progress = progress
         self._gravity, self._effort = gravity, effort
-        self._limits: dict[Role, tuple[Limit, ...]] = {}
         self._known: dict[Role, Saturation] = {}
         self._recorded: dict[Recording, list[Recorded]] = {}
         self._conventions: dict[Recording, Notice] | None = None
@@ -262,6 +261,10 @@ class Recordings:
     def accepted(self) -> set[str]:
         """Codes of what the user says is right in some log."""
         return {code for log in self.logs for code in log.origin.reading.accepted}
+
+    def _limits(self, log: Recording) -> tuple[Limit, ...]:
+        """Limits of the torques of logs of its role, once they are judged."""
+        return self._known[log.role].limits if log.role in self._known else ()
 
     def _weight(self, log: Recording) -> float:
         """Gravity in m/s² in a log's torque; no driver compensates for that of a payload."""
@@ -337,7 +340,7 @@ class Recordings:
         uniform = segments(self._blocks(log))
         first = list(islice(uniform, 1))  # which the limits are known after
         held: list[Segment] = []
-        for piece in sound(chain(first, uniform), self._limits.get(log.role, ())):
+        for piece in sound(chain(first, uniform), self._limits(log)):
             rows += len(piece)
             if rows <= self._room:
                 held.append(piece)
@@ -430,7 +433,7 @@ class Recordings:
                 if log._findings is None:
                     log._findings = self._examined(log, block, whole=alone)
                 notices += log._findings
-                limits = self._limits.get(log.role, ())
+                limits = self._limits(log)
                 counts = [0] * len(limits)
             more = beyond(block, limits)
             counts = [count + own for count, own in zip(counts, more, strict=True)]
@@ -451,7 +454,7 @@ class Recordings:
         from algid.inspection.conventions import judged
 
         begin = block if whole else block.part(0, EXAMINED)
-        if log.role not in self._limits:
+        if log.role not in self._known:
             self._judge_arm(log, begin)
         alike = [one for one in self.logs if one.role == log.role]
         found = examine(
@@ -464,7 +467,7 @@ class Recordings:
         )
         notices = admitted(begin, found)
         if len(alike) == 1 and any(one.code in CONTRADICTIONS for one in notices):
-            self._limits[log.role] = ()  # of an arm that is not this one
+            del self._known[log.role]  # of an arm that is not this one
         return notices
 
     def _judge_arm(self, log: Recording, begin: Log) -> None:
@@ -481,7 +484,7 @@ class Recordings:
                     other._begin = block if alone else None  # so that it is not read again
                     begins[other] = block if alone else block.part(0, EXAMINED)
         known = saturation(*begins.values(), gravity=self._weight(log), effort=self._effort)
-        self._known[log.role], self._limits[log.role] = known, known.limits
+        self._known[log.role] = known
         if len(alike) > 1 and self._effort != "external":
             for one, samples in begins.items():
                 self._recorded[one] = recorded(samples, seconds_of_each(len(alike)))

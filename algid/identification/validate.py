@@ -67,8 +67,8 @@ class Validated:
     ----------
     logs : by its name the prediction of each log, None where it is too short to judge
     total : that of all logs together
-    simulation : by log, then of all, how far the arm simulated forward comes from its angles; empty
-        where that was not asked for
+    simulation : by log, then of all, a row each horizon: how far the arm simulated forward comes
+        from its angles, None where there is no start or it runs away; empty where not asked for
     warnings : what its reader should know
     max_nrmse : the largest normalised RMSE allowed, if any
     judged : errors beside their limits, of a synthetic log's result
@@ -76,7 +76,7 @@ class Validated:
 
     logs: Mapping[str, TorquePrediction | None] = field(default_factory=dict)
     total: TorquePrediction | None = None
-    simulation: Mapping[str, RolloutScore] = field(default_factory=dict)
+    simulation: Mapping[str, list[dict[str, Any]]] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     max_nrmse: float | None = None
     judged: tuple[Judged, ...] = ()
@@ -99,39 +99,16 @@ class Validated:
             return False
         return self.total is None or max(self.total.nrmse) > self.max_nrmse
 
-    @property
-    def simulated(self) -> dict[str, list[dict[str, Any]]]:
-        """By log, then of all, a row each horizon; empty where nothing was simulated.
-
-        None where there is no start, or where the simulation runs away.
-        """
-        by_log = {}
-        for name, one in self.simulation.items():
-            rows = zip(HORIZONS, one.count, one.rmse, one.distance, strict=True)
-            by_log[name] = [
-                {
-                    "horizon": horizon,
-                    "starts": int(starts),
-                    "rmse": list(map(finite, rmse)),
-                    "moved": list(map(finite, moved)),
-                }
-                for horizon, starts, rmse, moved in rows
-            ]
-        return by_log
-
     def as_json(self) -> str:
         """All of it as the text of a JSON file."""
         every = [*self.logs.values(), self.total]
-        *logs, total = (None if one is None else one.model_dump(mode="json") for one in every)
-        content: dict[str, Any] = {
-            "logs": dict(zip(self.logs, logs, strict=True)),
-            "total": total,
-            "over": self.over,
-        }
+        *logs, total = (one and one.model_dump(mode="json") for one in every)
+        content: dict[str, Any] = {"logs": dict(zip(self.logs, logs, strict=True))}
+        content |= {"total": total, "over": self.over}
         if self.judged:
             content["errors"] = [vars(one) for one in self.judged]
         if self.simulation:
-            content["simulation"] = self.simulated
+            content["simulation"] = self.simulation
         return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
     def tables(self) -> Iterator[Table]:
@@ -145,14 +122,14 @@ class Validated:
         called.append(EVERY)
         yield prediction_table(dict(zip(called, [*self.logs.values(), self.total], strict=True)))
         rows: list[tuple[str, ...]] = []
-        for name, horizons in zip(called, self.simulated.values(), strict=False):
+        for name, horizons in zip(called, self.simulation.values(), strict=False):
             for row in horizons:
+                place = (name, f"{row['horizon']:g}", str(row["starts"]))
                 for joint, moved in enumerate(zip(row["rmse"], row["moved"], strict=True)):
                     cells = [ABSENT, ABSENT]
                     if row["starts"]:
                         cells = ["without bounds" if x is None else f"{x:.4g}" for x in moved]
-                    place = (name, f"{row['horizon']:g}", str(row["starts"]), str(joint + 1))
-                    rows.append((*place, *cells))
+                    rows.append((*place, str(joint + 1), *cells))
         if rows:
             headings = "Log | Horizon, s | States | Joint | RMSE, rad | Moved, rad"
             yield Table("Angles of the arm simulated forward", headings, rows)
@@ -174,19 +151,29 @@ def validate(known: Predictor, survey: Recordings, *, simulate: bool = False) ->
         If a parameter that the prediction needs has no estimate.
     """
     predictions: dict[str, TorquePrediction | None] = {}
-    simulation: dict[str, RolloutScore] = {}
-    total, rolled = PredictionScore(), RolloutScore()
+    simulated: dict[str, RolloutScore] = {}
+    total = PredictionScore()
     for log, one in zip(survey.logs, scores(known, survey), strict=True):
         predictions[log.name] = prediction(one)
         total += one
         if simulate:
             duration, moving = survey.whole(log).duration, survey.segments(log)
             c = known.coefficients(log.role)
-            angles = rollouts(known.model, c, moving, duration, known.shift)
-            simulation[log.name] = angles
-            rolled += angles
+            simulated[log.name] = rollouts(known.model, c, moving, duration, known.shift)
     if simulate:
-        simulation[EVERY] = rolled
+        simulated[EVERY] = sum(simulated.values(), RolloutScore())
+    simulation = {}
+    for name, score_of in simulated.items():
+        columns = (HORIZONS, score_of.count, score_of.rmse, score_of.distance)
+        simulation[name] = [
+            {
+                "horizon": horizon,
+                "starts": int(starts),
+                "rmse": list(map(finite, rmse)),
+                "moved": list(map(finite, moved)),
+            }
+            for horizon, starts, rmse, moved in zip(*columns, strict=True)
+        ]
     return Validated(predictions, prediction(total), simulation)
 
 

@@ -101,11 +101,7 @@ def write_pages(result: TrackResult, folder: Path, mcap: bool = False) -> list[P
 def stretch_table(result: TrackResult) -> Table:
     """The stretches, their masses and intervals."""
     rows = []
-    stretches = result.track.stretches
-    truths = result.truth or (None,) * len(stretches)
-    for place, (one, status, truth) in enumerate(
-        zip(stretches, result.statuses, truths, strict=True), start=1
-    ):
+    for place, (one, status, truth) in enumerate(result.rows, start=1):
         error = None if truth is None else one.m_p - truth
         true = [resolved(truth, one.std), resolved(error, one.std)]
         span = (f"{one.start:.3f}", f"{one.end:.3f}")

@@ -114,6 +114,12 @@ class TrackResult:
         return found
 
     @property
+    def rows(self) -> list[tuple[Stretch, StretchStatus, float | None]]:
+        """Each stretch with its status and, where it is known, the true payload in kg."""
+        truth = self.truth or (None,) * len(self.track.stretches)
+        return list(zip(self.track.stretches, self.statuses, truth, strict=True))
+
+    @property
     def complete(self) -> bool:
         """True if every stretch has status OK."""
         return set(self.statuses) <= {StretchStatus.OK}
@@ -134,8 +140,7 @@ class TrackResult:
 def track_json(result: TrackResult) -> str:
     """The text of `track.json`: times in s since the log's first sample, masses in kg."""
     track, stretches = result.track, []
-    truth = result.truth or (None,) * len(track.stretches)
-    for one, status, mass in zip(track.stretches, result.statuses, truth, strict=True):
+    for one, status, mass in result.rows:
         more = {"ci95": list(one.ci95), "unit": "kg", "status": status.value, "truth": mass}
         stretches.append(asdict(one) | more)
     changes = [dict(zip(("t", "from", "to"), row, strict=True)) for row in track.changes.tolist()]
@@ -242,7 +247,7 @@ def write_tables(result: TrackResult, folder: Path) -> None:
     stretches = pl.DataFrame(
         [
             (one.start, one.end, one.m_p, one.std, *one.ci95, status.value)
-            for one, status in zip(track.stretches, result.statuses, strict=True)
+            for one, status, _ in result.rows
         ],
         schema=["start", "end", "m_p", "m_p_std", "low", "high", "status"],
         orient="row",

@@ -26,7 +26,6 @@ SETTINGS = {
     "weak, observer": Settings(estimator="weak", observer="luenberger", model="plain"),
     "refined": Settings(estimator="refined", model="plain"),
     "paper": Settings(estimator="paper"),
-    "paper, zero phase": Settings(estimator="paper", observer="zero-phase"),
 }
 
 

@@ -1,6 +1,4 @@
-"""Where velocities come from: the log, the paper's observer, or the zero-phase differentiator,
-stretch by stretch.
-"""
+"""Where velocities come from: the log, or the paper's observer, stretch by stretch."""
 
 from __future__ import annotations
 
@@ -8,18 +6,14 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.base.errors import LogError
+from algid.base.errors import LogError, SettingError
+from algid.identification.by_paper import run_paper
 from algid.identification.passes import with_velocities
-from algid.identification.recordings import Recordings
+from algid.identification.recordings import Recordings, open_source
 from algid.log import Log, Origin
 from algid.settings import Settings
-from algid.signals.filters import differentiator, half_length
 from algid.signals.segments import Segment, append
 from tests.identification.fits import in_blocks
-
-DT = 1e-3
-BANDWIDTH = 60.0
-REACH = half_length(DT, BANDWIDTH)
 
 
 def log_at(stamps: FloatArray, omega: FloatArray | None = None) -> Log:
@@ -29,12 +23,11 @@ def log_at(stamps: FloatArray, omega: FloatArray | None = None) -> Log:
     return Log(stamp_ns, theta, 5 * np.cos(theta), Origin("walk.csv", "csv", {}), omega)
 
 
-def observed(log: Log, rows: int, *, luenberger: bool = False, **settings: object) -> list[Segment]:
+def observed(log: Log, rows: int, **settings: object) -> list[Segment]:
     """The log, read in blocks of `rows` samples, with velocities: each stretch in one segment."""
     source = in_blocks(log, range(rows, len(log), rows))
     whole: list[Segment] = []
-    wanted = Settings(bandwidth=BANDWIDTH).but(**settings)
-    for part in with_velocities(Recordings([source]), source, wanted, luenberger=luenberger):
+    for part in with_velocities(Recordings([source]), source, Settings().but(**settings)):
         if part.continues:
             whole[-1] = append(whole[-1], part)
         else:
@@ -42,32 +35,21 @@ def observed(log: Log, rows: int, *, luenberger: bool = False, **settings: objec
     return whole
 
 
-def differentiated(theta: FloatArray) -> FloatArray:
-    """By NumPy's convolution, both ends turned about their last sample."""
-    extended = np.pad(theta, ((0, 0), (REACH, REACH)), mode="reflect", reflect_type="odd")
-    return np.stack([np.correlate(row, differentiator(DT, BANDWIDTH), "valid") for row in extended])
-
-
-TWO = np.concatenate([np.arange(6000.0), np.arange(6100.0, 6900.0)])
-
-
-@pytest.mark.parametrize("rows", [6800, 700, 97])
-def test_the_differentiator_does_not_see_blocks_and_starts_anew_behind_a_gap(rows: int) -> None:
-    log = log_at(TWO)
-    first, second = observed(log, rows)
-    for found, own in ((first, slice(0, 6000)), (second, slice(6000, None))):
-        np.testing.assert_array_equal(found.theta, log.theta[:, own])
-        np.testing.assert_allclose(found.omega, differentiated(log.theta[:, own]), atol=1e-9)
-    assert second.start == pytest.approx(6.1, abs=1e-9)
+def test_the_papers_method_has_its_own_observer() -> None:
+    refused = (
+        "--set observer zero-phase: the paper's method observes as the paper does; leave it out, "
+        "say --set velocity=measured, or use --estimator refined or weak"
+    )
+    settings = Settings(estimator="paper", observer="zero-phase")
+    with pytest.raises(SettingError) as said:
+        run_paper(Recordings([open_source(log_at(np.arange(300.0)), "unloaded")]), settings)
+    assert str(said.value) == refused
 
 
 def test_measured_velocities_are_the_logs_whatever_the_observer() -> None:
     omega = np.random.default_rng(1).normal(size=(2, 300))
-    for luenberger in (False, True):
-        (found,) = observed(
-            log_at(np.arange(300.0), omega), 300, luenberger=luenberger, velocity="measured"
-        )
-        np.testing.assert_array_equal(found.omega, omega)
+    (found,) = observed(log_at(np.arange(300.0), omega), 300, velocity="measured")
+    np.testing.assert_array_equal(found.omega, omega)
 
 
 def test_a_log_without_velocities_is_refused_in_one_line_that_says_what_to_do() -> None:
