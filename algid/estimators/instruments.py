@@ -4,8 +4,9 @@ On a real arm the torque that no model holds (friction, play, cogging) drives th
 columns X of the momentum form are then correlated with its residual, and least squares on them is
 attenuated, however they are weighed. Instruments Z are the same columns of a motion which that
 torque did not drive: simulated from each window's measured start with the measured torque and the
-present coefficients, or the motion that a logged reference explains (`references`): under feedback
-the torque answers, the reference does not. The estimate solves
+present coefficients, or the motion that a logged reference explains: under feedback the torque
+answers what the model lacks, the reference that the controller follows does not. The estimate
+solves
 
     Σ w Z (y − Xᵀ c) = 0
 
@@ -15,6 +16,15 @@ combine as for any estimator:
 
     S = Aᵀ V⁻¹ A,    g = Aᵀ V⁻¹ Σ w Z (y − Xᵀ c0),    A = Σ w Z Xᵀ,    V = Σ w Z Zᵀ
 
+What a reference q_d explains of the motion is found by least squares, joint by joint, on both
+joints' references some time ago, of all logs together:
+
+    θ̂(t) = b0 + Σ_l B_l q_d(t − l),   l = 0 … `_LONGEST` s, denser near zero
+
+The columns along θ̂ are then the instruments: the auxiliary model of Janot et al., made of the log
+in place of a simulated controller, of which a log says nothing. A right θ̂ makes them strong; a
+wrong one leaves them valid.
+
 ======  ================================================  ========================  ========
 symbol  name                                              shape                     unit
 ======  ================================================  ========================  ========
@@ -23,12 +33,15 @@ Z       the same of the simulated motion                  (2, q, R)             
 y       the torque's moments                              (2, R)                    N m
 w       inverse residual variance of a row of each joint  (2,)                      1/(N m)²
 gram    [Z X y] [Z X y]ᵀ by stretch and joint             (B, 2, 2 q + 1, 2 q + 1)  mixed
+q_d     reference                                         (2, N)                    rad
+F       references some time ago, and 1                   (m, N)                    rad
+B       what the reference makes of angles and torques    (4, m)                    mixed
 ======  ================================================  ========================  ========
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import ceil
 
@@ -48,16 +61,13 @@ from algid.estimators.fit import Fit, finish
 from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem, Source, WeakSettings
-from algid.estimators.references import Explained, followed
 from algid.model import Model, advanced, inertia
 from algid.signals.filters import correlate, differentiator, half_length, smoother
 from algid.signals.segments import Segment
 
 _ROUNDS = 4
 _STRIDE = 2  # windows overlap four-fold: more add little, and each is simulated
-_STEP = (
-    4e-3  # s: of the simulation at most, in which motions of 10 Hz turn by a quarter of a radian
-)
+_STEP = 4e-3  # s: of the simulation at most, in which 10 Hz turn by a quarter of a radian
 _ASTRAY = 100.0  # rad: a simulated window that ends so far from the measured one has run away
 _FEWEST = 0.5  # share of the windows that must not go astray
 _TOGETHER = 8 * (weak.PIECE_SAMPLES + 4096)  # samples whose windows are simulated side by side
@@ -281,3 +291,86 @@ def simulated(
     # A window that went astray is left out; products of its velocities would overflow.
     states[..., ~good] = 0.0
     return states, good
+
+
+_LONGEST = 1.0  # s: a joint has followed its reference by then
+_LAGS = 16
+_TOLERANCE = 1e-9  # relative eigenvalue: a slow reference is almost the one a lag before
+_FARTHEST = 1e4  # rad: no joint turns so far
+_KNOWN = 0.5  # share of a piece's samples that have a reference
+FOLLOWED = 0.5
+"""Share of each joint's motion (R²) that a reference explains, at least, to be an instrument."""
+
+
+Explained = Callable[[Segment], Segment | None]
+"""Gives a piece with the angles, velocities and torques that its reference explains; None where it
+has none."""
+
+
+def followed(problem: Problem) -> Explained | None:
+    """How the arm follows the references of its logs; None where one has none, or it does not."""
+    gram = None
+    for source in problem.logs:
+        known = False
+        for piece, _, _ in weak.overlapping(source(), problem.settings):
+            if piece.reference is None:
+                return None
+            F = _features(piece)
+            if F is not None:
+                rows = np.concatenate([F, piece.theta, piece.tau])
+                gram = rows @ rows.T + (0.0 if gram is None else gram)
+                known = True
+        if not known:
+            return None
+    if gram is None:
+        return None
+    m = len(gram) - 4
+    B = gram[m:, :m] @ scaled_pinv(gram[:m, :m], _TOLERANCE)
+    count, sums = gram[m - 1, m - 1], gram[m : m + 2, m - 1]
+    total = np.diag(gram)[m : m + 2] - sums**2 / count
+    left = np.diag(gram)[m : m + 2] - np.sum(B[:2] * gram[m : m + 2, :m], axis=1)
+    if not np.all(left < (1 - FOLLOWED) * total):
+        return None
+
+    def explained(piece: Segment) -> Segment | None:
+        F = _features(piece)
+        if F is None:
+            return None
+        theta, tau = np.split(B @ F, 2)
+        omega = None if piece.omega is None else np.gradient(theta, piece.dt, axis=1)
+        return replace(piece, theta=theta, tau=tau, omega=omega)
+
+    return explained
+
+
+def _features(piece: Segment) -> FloatArray | None:
+    """F (m, N), the last row 1; None where most samples of the piece have no reference.
+
+    Before its beginning, and where it has none, a reference is taken to have stood still.
+    """
+    reference = _filled(piece.reference)
+    if reference is None:
+        return None
+    count = len(piece)
+    lags = np.unique(
+        np.rint(_LONGEST / piece.dt * (np.arange(_LAGS) / (_LAGS - 1)) ** 2).astype(np.int64)
+    )
+    at = np.maximum(np.arange(count) - lags[:, None], 0)
+    ago = reference[:, at].reshape(-1, count)
+    return np.concatenate([ago, np.ones((1, count))])
+
+
+def _filled(reference: FloatArray | None) -> FloatArray | None:
+    """A reference (2, N) with the last one before each sample that has none.
+
+    At the beginning the first. None where fewer than `_KNOWN` of the samples have one.
+    """
+    if reference is None:
+        return None
+    good = np.all(np.abs(reference) < _FARTHEST, axis=0)
+    if good.all():
+        return reference
+    if np.mean(good) < _KNOWN:
+        return None
+    place = np.maximum.accumulate(np.where(good, np.arange(good.size), 0))
+    return reference[:, np.maximum(place, np.argmax(good))]

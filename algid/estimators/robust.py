@@ -73,10 +73,10 @@ from algid.estimators.combine import (
 from algid.estimators.diagnostics import broken_bounds
 from algid.estimators.excitation import undriven
 from algid.estimators.fit import Fit, finish, solved_anew
+from algid.estimators.instruments import Explained, followed
 from algid.estimators.modulating_functions import Known, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
-from algid.estimators.references import Explained, followed
 from algid.estimators.repeats import Groups, grouped, merged, shared_out
 from algid.estimators.weak import Normal
 from algid.model import DELAYS, EVERY_TERM, K3, K5, RIGID, SINES, TERMS, attributes

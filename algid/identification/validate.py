@@ -8,8 +8,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from algid.base.text import ABSENT, file_name, visible
-from algid.estimators.prediction import CUTOFF, FILTER, PredictionScore, score
-from algid.estimators.rollout import HORIZONS, RolloutScore, rollouts
+from algid.estimators.prediction import (
+    CUTOFF,
+    FILTER,
+    HORIZONS,
+    PredictionScore,
+    RolloutScore,
+    rollouts,
+    score,
+)
 from algid.identification.known import as_logged, model_of, reused, shift_of, torque_constants
 from algid.identification.recordings import LogLike, Recordings, Role, open_source
 from algid.identification.series import Predictor, torque_blocks

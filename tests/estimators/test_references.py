@@ -9,8 +9,8 @@ import pytest
 from scipy.signal import lfilter
 
 from algid.arm import FloatArray
+from algid.estimators.instruments import Explained, followed
 from algid.estimators.problem import WeakSettings
-from algid.estimators.references import Explained, followed
 from algid.log import Log, Origin, join
 from algid.signals.segments import Segment, segments
 from tests.estimators.conftest import problem_of

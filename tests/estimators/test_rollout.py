@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.estimators.rollout import (
+from algid.estimators.prediction import (
     HORIZONS,
     _angles_at_horizons,
     rollouts,
