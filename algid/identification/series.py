@@ -16,7 +16,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.base.arrow import table_of_columns
 from algid.estimators.elastic import flexed
-from algid.estimators.fit import Fit
+from algid.estimators.fit import Fit, has_running, running
 from algid.estimators.innovations import (
     ResidualSums,
     autocorrelation,
@@ -26,7 +26,6 @@ from algid.estimators.innovations import (
 )
 from algid.estimators.noise import first_guess
 from algid.estimators.prediction import CUTOFF, MOTION, scored_torque
-from algid.estimators.running import has_running, running
 from algid.identification.recordings import Recordings, Role
 from algid.model import Model, Motion, inertia, torque
 from algid.signals.filters import half_length, smoothed

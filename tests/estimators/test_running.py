@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from algid.estimators import refined, weak
-from algid.estimators.fit import Fit
-from algid.estimators.running import has_running, running
+from algid.estimators.fit import Fit, has_running, running
 from algid.estimators.whitening import NoiseLevels
 
 from .conftest import Bench, problem_of
