@@ -6,6 +6,7 @@ Remedies are written for a command line, a profile and Python alike.
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
@@ -17,6 +18,7 @@ from algid.notices import (
     message,
     messages,
 )
+from algid.options import BY_SET
 from algid.profile import Profile, with_settings
 from algid.results.verdict import CAUSES
 from tests.cli.commands import profile_from
@@ -75,8 +77,10 @@ def test_every_code_of_an_earlier_version_has_one_of_now() -> None:
 
 
 def test_every_entry_is_whole() -> None:
-    """A code has a cause; its notes and losses name cases that it has."""
+    """A code has a cause; its notes and losses name cases, and its text flags, that there are."""
+    by_set = {f"--{name.replace('_', '-')}" for name in BY_SET}
     for one in messages():
+        assert not by_set & set(re.findall(r"--[a-z][a-z0-9-]+", str(one))), one
         assert one["cause"], one
         for cases in (one["note"], one["lossy"]):
             assert isinstance(cases, bool) or set(cases) <= set(one["text"]), one
