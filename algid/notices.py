@@ -74,6 +74,10 @@ class Remedy:
             word if _IN_MARKS.fullmatch(word) else shlex.quote(word) for word in self.flags
         )
 
+    def __str__(self) -> str:
+        """As messages name it."""
+        return f"{self.when}: {self.words}" if self.when else self.words
+
 
 _IN_MARKS = re.compile(r'[\w.]+="[\w ]+"')
 
