@@ -41,7 +41,7 @@ IDEAS = {
     "Runge-Kuttas": r"/ 6(\.0)? \* \(",
     "sandwiches": r"^combine\.sandwich$",
     "tests of the model": r"^(log_likelihood\.refuted|innovations\.judge|misfit\.misfit)$",
-    "choosers of terms": r"^(terms\.select|by_likelihood\.revised)$",
+    "choosers of terms": r"^terms\.run$",
 }
 """By idea, a pattern of `module.function` or of the source of each function of the core that holds
 it: one each is enough."""

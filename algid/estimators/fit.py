@@ -6,17 +6,17 @@ them do, to what the estimator had found by then.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from algid.arm import FloatArray, keep_arrays, read_only
 from algid.base.compiled import student_quantile
 from algid.base.names import vector
-from algid.base.significance import NORMAL, level
+from algid.base.significance import NORMAL
 from algid.estimators.combine import (
     FEWEST_LOGS,
     LogInformation,
@@ -40,40 +40,11 @@ from algid.estimators.whitening import NoiseLevels
 from algid.model import DELAYS
 from algid.notices import Notice, has_code
 
+if TYPE_CHECKING:
+    from algid.estimators.terms import Products
+
 Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION", "FROM_PRIOR"]
 Intervals = Literal["likelihood", "sandwich", "jackknife"]
-
-
-@dataclass(frozen=True)
-class Overlooked:
-    """A term that the model is without: p value of its score, and what its coefficients would be.
-
-    `values` are by the name of the parameter, in `algid.model.UNITS`.
-    """
-
-    term: str
-    p_value: float
-    values: Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """The score test of a likelihood's residual against the motion: see `algid.estimators.misfit`.
-
-    Parameters
-    ----------
-    p_value : float
-        Of all torques beside the model's together, and of the most evident kind (Bonferroni).
-    overlooked : the terms that the model is without, in the order of `algid.model.CHOICES`
-    """
-
-    p_value: float
-    overlooked: tuple[Overlooked, ...]
-
-    @property
-    def significant(self) -> bool:
-        """Whether the residual depends on the motion."""
-        return self.p_value < level("REFUTED")
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +77,7 @@ class Fit:
     moved : (2,), rad, how far each joint travelled
     shrinkage : the prior's part on the torque's terms; None where none is shrunk
     repeats : places of logs that repeat each other, where that was looked at
-    misfit : whether the residual of the likelihood depends on the motion, where that was looked at
+    products : what the likelihood at the estimates says of every term, where it was looked at
     """
 
     estimator: str
@@ -130,7 +101,7 @@ class Fit:
     moved: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
     shrinkage: Prior | None = None
     repeats: Groups = ()
-    misfit: Misfit | None = None
+    products: Products | None = None
 
     def __post_init__(self) -> None:
         keep_arrays(self)

@@ -233,22 +233,19 @@ class LogEvidence:
         """The larger torque's error over the least that anybody need worry about."""
         return float(np.max(self.noise.tau / self._least))
 
-    def products(self, c: FloatArray, beside: Beside | None = None) -> tuple[FloatArray, float]:
-        """Products (2, m, m) by joint of the training set's whitened columns at `c`.
+    def products(self, shared: Shared, c: FloatArray, beside: Beside) -> tuple[FloatArray, float]:
+        """Products (2, m, m) by joint of the training set's whitened columns at `c` of `shared`.
 
         The residual's column follows those of the q coefficients, then come torques `beside` the
         model's. With them the logarithm of the covariance's determinant.
         """
-        gram, determinant = np.zeros(()), 0.0
+        gram, determinant, model = np.zeros(()), 0.0, shared.model
         for piece, theta in zip(self.kept, self._trajectories, strict=True):
-            linear = self._linearise(c, theta, piece)
-            columns = linear.columns
-            if beside is not None:
-                model = self._shared.model
-                made = beside(model, c[: len(model.names)], linear.motion, piece.dt)
-                rows = (made / self.noise.tau[None, :, None]).swapaxes(1, 2)
-                rows = np.ascontiguousarray(rows).reshape(rows.shape[0], -1)
-                columns = np.concatenate([columns, linear.solve_in_place(rows)])
+            linear = self._linearise(c, theta, piece, shared)
+            made = beside(model, c[: len(model.names)], linear.motion, piece.dt)
+            rows = (made / self.noise.tau[None, :, None]).swapaxes(1, 2)
+            rows = np.ascontiguousarray(rows).reshape(rows.shape[0], -1)
+            columns = np.concatenate([linear.columns, linear.solve_in_place(rows)])
             by_joint = columns.reshape(len(columns), -1, 2).transpose(2, 0, 1)
             gram = gram + by_joint @ by_joint.swapaxes(1, 2)
             determinant += 2 * float(np.log(linear.factor[-1]).sum())

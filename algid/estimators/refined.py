@@ -31,19 +31,21 @@ from algid.base.criteria import SETTLED
 from algid.base.names import evenly_spread
 from algid.base.progress import Progress
 from algid.base.quantiles import quantile
+from algid.base.significance import level
 from algid.estimators.body import with_body
 from algid.estimators.combine import Prior, combine
 from algid.estimators.fit import Fit, finish
 from algid.estimators.identifiability import open_directions
 from algid.estimators.innovations import judge
 from algid.estimators.log_likelihood import LogEvidence, Outcome, opened
-from algid.estimators.misfit import columns, misfit
+from algid.estimators.misfit import misfit, shapes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem
 from algid.estimators.repeats import Groups, grouped
+from algid.estimators.terms import Products
 from algid.estimators.weak import fit as weak_fit
 from algid.estimators.whitening import NoiseLevels
-from algid.model import TERMS, Model
+from algid.model import TERMS, Model, attributes
 from algid.notices import Notice
 from algid.signals.segments import Segment
 
@@ -141,13 +143,15 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
     if width is not None:
         fitted = replace(fitted, covariance=fitted.covariance + width.covariance)
     if noise is None:
-        products = []
-        for log in evenly_spread(logs, _MOST_TESTED):
-            gram, _ = log.products(shared.coefficients(fitted.values, log.loaded), columns)
-            products.append((log.loaded, gram.sum(axis=0)))
-        lacking = misfit(fitted, products, prior)
-        if lacking.significant:
-            return replace(given_up("motion", p_value=lacking.p_value), misfit=lacking)
+        tested = evenly_spread(logs, _MOST_TESTED)
+        for log in tested:
+            log.smooth, log.by_motion = True, not attributes(shared.model, "elastic")
+        at = {log.loaded: shared.coefficients(fitted.values, log.loaded) for log in tested}
+        products = Products(tested, shared, at, problem.settings.shift.delay, shapes)
+        p_value = misfit(fitted, products, prior)
+        if p_value < level("REFUTED"):
+            return replace(given_up("motion", p_value=p_value), products=products)
+        fitted = replace(fitted, products=products)
     # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.
     status = list(fitted.status)
     for place, before in enumerate(start.status):

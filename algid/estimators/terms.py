@@ -1,15 +1,16 @@
-"""Which terms the torque's model needs, by the likelihood of its first pass.
+"""Which terms the torque's model needs, by the likelihood of its first pass and of a fit.
 
 One pass of the likelihood over pieces of the logs is linearised with the columns of every term, at
 the weak form's estimate with the most common ones. Whitened by the noise levels that neighbouring
 samples show, its normal equations hold every model without some of the terms: each is linear
 algebra. From no term on, the one whose evidence outweighs its price most is added,
 
-    W / s² > n (log N + 2 log T)
+    W / s² > χ²_n(1 - α / T)
 
 with W what its n coefficients explain of the squares, s² the mean square that all terms leave (1 at
-least), N the samples (Schwarz 1978) and T the terms to choose from (Chen & Chen 2008, γ = 1); then
-those are dropped that are not worth it beside the others. A rotor is an exception, as every geared
+least), T the terms to choose from and α the level at which the likelihood is refuted, so that what
+refutes it is chosen where it is a term; then those are dropped that are not worth it beside the
+others. A rotor is an exception, as every geared
 motor has one and k1, k3 and k5 take it up: it stays from W / s² > 3.84 on if they would move by
 more than two of the deviations that they had without it.
 
@@ -35,11 +36,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.base.compiled import chi2_exceeded
 from algid.base.names import evenly_spread, outside, vector, within
+from algid.base.significance import level
 from algid.estimators import weak
 from algid.estimators.combine import scaled_pinv
 from algid.estimators.hold import SURE, Hold, Lateness
-from algid.estimators.log_likelihood import LogEvidence, opened
+from algid.estimators.log_likelihood import Beside, LogEvidence, opened
 from algid.estimators.modulating_functions import Known, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
@@ -54,9 +57,12 @@ from algid.model import (
     SINES,
     TERMS,
     Model,
+    Motion,
+    attributes,
     loads_of,
     names_of,
     terms_named,
+    torque,
     without_delay,
 )
 from algid.physics.effort import ELASTIC
@@ -67,8 +73,6 @@ from algid.signals.segments import pieces, spread_pieces
 CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and not term.lags)
 """Terms that the logs choose from; one column serves lag and delay, equal to first order."""
 _LAG = tuple(name for name, term in EVERY_TERM.items() if term.lags)
-# Where a joint has no motor, its gain is nothing and makes its equation vanish.
-_OF_BOTH_TORQUES = tuple(name for name in CHOICE if EVERY_TERM[name].gains)
 _STARTS = {
     "coulomb_speed": np.array([0.01, 0.02, 0.04, 0.08, 0.16, 0.32]),
     "stribeck_speed": np.array([0.1, 0.3, 0.9]),
@@ -99,7 +103,7 @@ class TermTrial:
     term : str
     kept : bool
     evidence : float
-        Its Wald statistic less its price; negative where it is not worth it.
+        What it explains of the squares less what chance does; negative where it is not worth it.
     reason : str
         Why it was kept or left out, in words.
     """
@@ -153,11 +157,6 @@ class Selection:
         if self.hold_by != "logs" or self.late is None or self.late.determined:
             return None
         return self.late
-
-
-def price(count: float, samples: float, choices: int) -> float:
-    """Evidence that `count` coefficients have to outweigh: see the module."""
-    return float(count * (np.log(samples) + 2 * np.log(max(2, choices))))
 
 
 def has_need(term: str, terms: Collection[str]) -> bool:
@@ -266,16 +265,42 @@ def _lowest(x: FloatArray, y: Sequence[float]) -> float:
     return float(x[least] - b / (2 * a))
 
 
-class FirstPass:
+WIDTHS = tuple(one.name for one in fields(Widths))
+"""Widths of friction, whose logarithms have a column where a term has that width."""
+TERM_OF = {name: term for term, entry in EVERY_TERM.items() for name in entry.names}
+_STEP = 1e-3
+"""Relative change of a width of friction by which its effect is differentiated."""
+
+
+def _widened(model: Model, c: FloatArray, motion: Motion, _dt: float) -> FloatArray:
+    """Derivatives (widths, 2, n) of the torque by the logarithms of friction's widths, in N m."""
+    rows = []
+    for width in WIDTHS:
+        sides = []
+        for step in (_STEP, -_STEP):
+            other = replace(model, **{width: getattr(model, width) * (1 + step)})
+            sides.append(torque(other, c, motion))
+        rows.append((sides[0] - sides[1]) / (2 * _STEP))
+    return np.stack(rows)
+
+
+class Products:
     """Normal equations of one pass of the likelihood, with the columns of every term.
 
     Parameters
     ----------
-    logs : each opened with the model of every term and a delay
-    at : coefficients (q,) of that model, of unloaded and of loaded logs
-        Where it is linearised.
+    logs : Sequence of LogEvidence
+    shared : Shared
+        Whose coefficients `at` are.
+    at : coefficients (q,) of unloaded and of loaded logs
+        Where it is linearised; those of other terms are zero.
     base : float, s
         The delay from which the column of the delay counts.
+    beside : Beside, optional
+        More torques, which are in `each` alone.
+
+    `names` are those of the coefficients, of every term and widths; `each` has for a log whether it
+    is loaded, and the products of its columns, their residual and the torques beside them.
     """
 
     def __init__(
@@ -284,35 +309,60 @@ class FirstPass:
         shared: Shared,
         at: Mapping[bool, FloatArray],
         base: float,
+        beside: Beside | None = None,
     ) -> None:
-        self.shared = shared
-        self.names = shared.log_names
-        loads = loads_of(shared.model)
+        own = shared.model.terms
+        every = tuple(name for name, term in TERMS.items() if not term.lags or name in own)
+        self.shared = Shared(replace(shared.model, terms=every), delay=True)
+        self.names = self.shared.log_names + WIDTHS
+        loads = loads_of(self.shared.model)
         self._rigid = np.flatnonzero([name in loads for name in self.names])
         self._both = len({log.loaded for log in logs}) == 2
         self.size = len(self.names) + self._both * len(self._rigid)
-        self._logs = logs
         self._base = base
         self.determinant = 0.0
-        grams = []
+        self.each: list[tuple[bool, FloatArray]] = []
+        grams, q = [], len(self.shared.log_names)
+
+        def torques(model: Model, c: FloatArray, motion: Motion, dt: float) -> FloatArray:
+            widened = _widened(model, c, motion, dt)
+            if beside is None:
+                return widened
+            return np.concatenate([widened, beside(model, c, motion, dt)])
+
+        driven = [
+            any(np.any(piece.tau[joint]) for log in logs for piece in log.kept) for joint in (0, 1)
+        ]
         for log in logs:
-            log.reshape(shared)
-            gram, determinant = log.products(at[log.loaded])
+            known = dict(zip(shared.log_names, at[log.loaded].tolist(), strict=True))
+            c = vector(self.names, {DELAYS[0]: base, **known}, otherwise=0.0)
+            gram, determinant = log.products(self.shared, c[:q], torques)
+            # widths stand with the coefficients, before the residual
+            rows = np.arange(gram.shape[-1])
+            rows[q : len(self.names) + 1] = [*range(q + 1, len(self.names) + 1), q]
+            gram = gram[:, rows[:, None], rows]
+            if not all(driven):
+                # where a joint has no motor, its gain is nothing and makes its equation vanish
+                for name, _ in attributes(self.shared.model, "gains"):
+                    gram[:, self.names.index(name)] = gram[:, :, self.names.index(name)] = 0
             self.determinant += determinant
+            self.each.append((log.loaded, gram.sum(axis=0)))
             # the torque itself in the place of what the point of linearisation leaves of it
-            change = np.eye(gram.shape[-1])
-            change[:-1, -1] = at[log.loaded]
-            change[-2, -1] -= base
-            grams.append(self._wide(log.loaded, change.T @ gram @ change))
+            change = np.eye(len(self.names) + 1)
+            change[:-1, -1] = c
+            change[q - 1, -1] -= base
+            own_gram = gram[:, : len(change), : len(change)]
+            grams.append(self._wide(log.loaded, change.T @ own_gram @ change))
         self._grams = np.array(grams)
         self.total = self._grams.sum(axis=(0, 1))
         self.samples = sum(log.trained for log in logs)
         self.dt = max(log.kept[0].dt for log in logs)
         of_delay = self.names.index(DELAYS[0])
         self.open_squares = (_STAMPS * self.dt) ** 2 * float(self.total[of_delay, of_delay])
+        self.noisy = self.open_squares < self.samples
 
     def _places(self, loaded: bool) -> NDArray[np.int64]:
-        """Where a log's coefficients stand in p."""
+        """Where a log's coefficients and widths stand in p."""
         places = np.arange(len(self.names))
         if loaded and self._both:
             places[self._rigid] = len(self.names) + np.arange(len(self._rigid))
@@ -326,8 +376,10 @@ class FirstPass:
         return wide
 
     def columns(self, terms: Iterable[str]) -> NDArray[np.int64]:
-        """Places in p of eq. (1) and of `terms`."""
-        return self._named(names_of(ALWAYS) + names_of(terms_named(terms)))
+        """Places in p of eq. (1), of `terms` and of their widths."""
+        present = tuple(terms_named(terms))
+        shapes = [width for term in present for width in term.shapes]
+        return self._named([*names_of(ALWAYS), *names_of(present), *shapes])
 
     def own(self, term: str) -> NDArray[np.int64]:
         """Places in p of the coefficients of one term."""
@@ -352,7 +404,7 @@ class FirstPass:
         """Coefficients (q,) of unloaded and of loaded logs, the delay whole."""
         at = {}
         for loaded in (False, True):
-            c = p[self._places(loaded)].copy()
+            c = p[self._places(loaded)][: len(self.shared.log_names)]
             c[-1] += self._base
             at[loaded] = c
         return at
@@ -362,11 +414,11 @@ class FirstPass:
         _, left, _ = self.solve(columns)
         return max(1.0, left / max(2 * self.samples - len(columns), 1))
 
-    def refuted(self, columns: NDArray[np.int64]) -> bool:
+    def refuted(self, logs: Sequence[LogEvidence], columns: NDArray[np.int64]) -> bool:
         """Whether `columns` leave more than a sensor's noise in a joint's torque of some log."""
         p, _, _ = self.solve(columns)
         v = np.append(-p, 1.0)
-        for log, gram in zip(self._logs, self._grams, strict=True):
+        for log, gram in zip(logs, self._grams, strict=True):
             left = np.maximum(np.einsum("i,aij,j->a", v, gram, v), 0.0)
             if log.exceeds_noise(log.noise.tau * np.sqrt(left / log.trained), _EXCESS):
                 return True
@@ -400,17 +452,18 @@ class FirstPass:
 class _Search:
     """Forward from the fixed terms by the most evident one, then backward."""
 
-    first: FirstPass
+    first: Products
     candidates: tuple[str, ...]
     fixed: tuple[str, ...]
     absent: Collection[str]
     scale: float
+    suspects: Collection[str]
 
     def evidence(self, term: str, beside: Sequence[str]) -> float:
-        """Evidence of `term` less its price."""
-        squares = self.explained(term, beside)
-        count = len(self.first.own(term))
-        return squares / self.scale - price(count, self.first.samples, len(self.candidates))
+        """What `term` explains of the squares, less what chance explains once in a level's logs."""
+        alone = level("REFUTED") / max(1, len(self.candidates))
+        by_chance = chi2_exceeded(len(self.first.own(term)), alone)
+        return self.explained(term, beside) / self.scale - float(by_chance)
 
     def explained(self, term: str, beside: Sequence[str]) -> float:
         """By how much `term` lowers the squares."""
@@ -419,17 +472,17 @@ class _Search:
         return without - left
 
     def beyond_sampling(self, term: str, beside: Sequence[str]) -> bool:
-        """Whether the squares fall by more than what the log's stamps leave open.
+        """Whether the squares fall by more than what the stamps of a log without noise leave open.
 
-        A simulator's log has no noise, and what its integration and sampling leave is no term.
+        A simulator's log has none, and what its integration and sampling leave is no term.
         """
-        return self.explained(term, beside) > self.first.open_squares
+        return self.first.noisy or self.explained(term, beside) > self.first.open_squares
 
     def plausible(self, term: str, beside: Sequence[str]) -> bool:
         """Whether the coefficients of `term` beside those terms are plausible."""
         p, _, _ = self.first.solve(self.first.columns([*beside, term]))
         c = self.first.coefficients(p)[False]
-        value = dict(zip(self.first.names, c.tolist(), strict=True))
+        value = dict(zip(self.first.shared.log_names, c.tolist(), strict=True))
         own = set(EVERY_TERM[term].names).difference(self.absent).intersection(value)
         for name in own.intersection(SINES):
             if np.arctan2(abs(value[name]), value[SINES[name]]) > LARGEST_PHASE:
@@ -442,13 +495,13 @@ class _Search:
         Every geared motor has one: the price of a term that few arms have is not its own.
         """
         suspected = self.explained(term, beside) > _SUSPECTED * self.scale
-        noisy = self.first.open_squares < self.first.samples  # more than the stamps leave open
-        if not (EVERY_TERM[term].rotor and suspected and noisy):
+        rotor = EVERY_TERM[term].rotor and term in self.suspects
+        if not (rotor and suspected and self.first.noisy):
             return False
         first, rest = self.first, self.first.columns(beside)
-        (rotor,) = first.own(term)
-        p, _, _ = first.solve(np.append(rest, rotor))
-        moves = np.abs(p[rotor]) * first.effect(rotor, rest, self.scale)
+        (place,) = first.own(term)
+        p, _, _ = first.solve(np.append(rest, place))
+        moves = np.abs(p[place]) * first.effect(place, rest, self.scale)
         arm = np.flatnonzero(np.isin(first.names, RIGID))
         return bool(np.any(moves[np.isin(rest, arm)] > _MOVES))
 
@@ -491,7 +544,7 @@ class _Search:
         if term in asked:
             reason = "asked for"
         elif term in kept and evidence > 0:
-            reason = "kept: evident in the first pass of the likelihood"
+            reason = "kept: evident in the likelihood"
         elif term in kept:
             reason = "kept: hardly significant, but k1 … k5 would move without it"
         elif evidence <= 0:
@@ -539,6 +592,28 @@ def select(
     return chosen
 
 
+def revised(
+    chosen: Selection, products: Products, kept: Sequence[str], absent: Collection[str]
+) -> Selection:
+    """The same choice by the likelihood at a fit's estimates, widths and noise levels."""
+    fixed = tuple(kept)
+    if chosen.delay and chosen.undetermined is not None:
+        fixed += DELAYS
+    tried = [trial.term for trial in chosen.trials]
+    scale = products.mean_square(products.columns(tried))
+    # a rotor that the first pass did not suspect is none for being hardly significant now
+    suspects = chosen.model.terms
+    search = _Search(products, outside(tried, fixed), fixed, absent, scale, suspects)
+    terms = search.run()
+    own = without_delay(terms)
+    return replace(
+        chosen,
+        model=replace(chosen.model, terms=own),
+        delay=len(own) < len(terms),
+        trials=tuple(search.trial(term, terms, fixed) for term in tried),
+    )
+
+
 def _selected(
     kinds: Sequence[Sequence[_Piece]],
     problem: Problem,
@@ -555,11 +630,6 @@ def _selected(
     unloaded, loaded = ([log for log, _ in own] for own in kinds)
     some = replace(problem, unloaded=unloaded, loaded=loaded)
     logs = [log for log in opened(some, shared) if log.loaded in start]
-    driven = [
-        any(np.any(piece.tau[joint]) for log in logs for piece in log.kept) for joint in (0, 1)
-    ]
-    if not all(driven):
-        candidates = outside(candidates, _OF_BOTH_TORQUES)
     at: dict[bool, FloatArray] = {}
     for is_loaded, c in start.items():
         at[is_loaded] = np.zeros(len(shared.log_names))
@@ -572,21 +642,21 @@ def _selected(
     # where angles are precise every joint would look elastic: the motion tells whether one is.
     for log in logs:
         log.by_motion = not elastic
-    first = FirstPass(logs, shared, at, base)
+    first = Products(logs, shared, at, base)
     soft = within(candidates, ELASTIC)
     if soft and not elastic:
         scale = first.mean_square(first.columns(everything))
-        search = _Search(first, everything, fixed, absent, scale)
+        search = _Search(first, everything, fixed, absent, scale, candidates)
         if search.evidence(soft[0], outside(everything, soft)) > 0:
             for log in logs:
                 log.by_motion = False
-            first = FirstPass(logs, shared, at, base)
+            first = Products(logs, shared, at, base)
     before: list[str] | None = None
     for left in reversed(range(_ROUNDS)):
         offered = first.columns(everything)
-        refuted = first.refuted(offered)
+        refuted = first.refuted(logs, offered)
         scale = first.mean_square(offered)
-        search = _Search(first, outside(candidates, fixed), fixed, absent, scale)
+        search = _Search(first, outside(candidates, fixed), fixed, absent, scale, candidates)
         terms = search.run()
         after = first.coefficients(first.solve(first.columns(terms))[0])
         # a delay of samples that explains most is far from linear in its column
@@ -598,7 +668,7 @@ def _selected(
         if (refuted and not far) or linear or terms == before:
             break
         at, before = after, terms
-        first = FirstPass(logs, shared, at, base)
+        first = Products(logs, shared, at, base)
         if left and far and late < -1:  # what is found has another round
             other = _lagging(logs, shared, at, base)
             others = outside(terms, DELAYS)
@@ -624,7 +694,8 @@ def _selected(
     )
     found = {}
     if not set(ELASTIC).isdisjoint(terms):
-        found = {kind: dict(zip(first.names, c.tolist(), strict=True)) for kind, c in after.items()}
+        names = first.shared.log_names
+        found = {kind: dict(zip(names, c.tolist(), strict=True)) for kind, c in after.items()}
     if not candidates:
         return chosen, found
     trials = tuple(search.trial(term, terms, kept) for term in everything)
@@ -633,7 +704,7 @@ def _selected(
 
 def _lagging(
     logs: Sequence[LogEvidence], shared: Shared, at: Mapping[bool, FloatArray], base: float
-) -> FirstPass:
+) -> Products:
     """The first pass with a lag of the torque in place of the delay at `at`, which is negative."""
     model = replace(shared.model, terms=shared.model.terms + _LAG)
     lagging = replace(shared, model=model)
@@ -642,4 +713,4 @@ def _lagging(
     for loaded, c in at.items():
         shifted[loaded] = np.insert(c, place, base - c[-1])
         shifted[loaded][-1] = base
-    return FirstPass(logs, lagging, shifted, base)
+    return Products(logs, lagging, shifted, base)

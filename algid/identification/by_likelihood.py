@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from algid.base.names import outside, within
-from algid.base.significance import level
+from algid.base.significance import SURE
 from algid.estimators import robust
 from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import constrained
 from algid.estimators.excitation import undriven
-from algid.estimators.fit import Fit, Misfit
+from algid.estimators.fit import Fit
 from algid.estimators.hold import Hold
 from algid.estimators.terms import (
     CHOICE,
     Selection,
     TermTrial,
-    has_need,
     needs_shape,
-    plausible,
-    price,
+    revised,
     select,
 )
 from algid.identification.known import model_of
@@ -173,7 +171,20 @@ def run_fit(
             notes = (Notice("REFUTED", numbers={"case": "noise", "kept": "weak"}),)
         else:
             fit = fitted(chosen)
-            fit, chosen = revised(fit, chosen, settings, fitted)
+            better, other = fit, chosen
+            for _ in range(_REVISIONS):
+                # its own likelihood has noise levels that the first pass lacked
+                if chosen.chosen_by != "logs" or better.products is None:
+                    break
+                nothing = absent(settings.effort, COLUMN_NAMES)
+                again = revised(other, better.products, settings.terms, nothing)
+                if (again.model.terms, again.delay) == (other.model.terms, other.delay):
+                    break
+                other, better = again, fitted(again)
+                if not better.refuted:
+                    fit, chosen = better, other
+                elif not fit.refuted:
+                    break
             if fit.refuted and settings.chooses:
                 notes = fit.notes
         picked = chosen
@@ -188,6 +199,10 @@ def run_fit(
     return Fitted(finished(fit, settings), survey, settings, chosen)
 
 
+_REVISIONS = 3
+"""Fits at most after the first one."""
+
+
 def finished(fit: Fit, settings: Settings) -> Fit:
     """The fit with the payload's body, within physics' bounds where the settings ask for it."""
     fit = averaged_over_bodies(with_body(fit))
@@ -197,6 +212,7 @@ def finished(fit: Fit, settings: Settings) -> Fit:
 
 
 _BY_NOTHING = "left out: it was judged beside constants near nothing"
+_ZERO = "left out: the fit finds it to be zero within its error"
 
 
 def _of_motorless(
@@ -229,10 +245,18 @@ def _of_motorless(
     if better is None:
         return fit, chosen
 
-    def refit(one: Selection) -> Fit:
-        return robust.of_passive_joint(problem_of(survey, settings, one, prior)) or better
-
-    return revised(better, plainer, settings, refit)
+    size = dict(zip(better.names, np.abs(better.values) / better.std, strict=True))
+    nothing = {
+        term
+        for term in outside(plainer.model.terms, settings.terms)
+        if max(size[name] for name in TERMS[term].names) < SURE
+    }
+    if nothing and plainer.chosen_by == "logs":
+        poorer = plainer.changed(nothing, _ZERO, kept=False)
+        without = robust.of_passive_joint(problem_of(survey, settings, poorer, prior))
+        if without is not None:
+            return without, poorer
+    return better, plainer
 
 
 _SHRUNK = "kept and shrunk: where the likelihood is refuted no term is chosen"
@@ -266,77 +290,3 @@ def _shrunk(
         trials=tuple(TermTrial(term, True, np.nan, _SHRUNK) for term in terms),
     )
     return replace(fit, notes=notes + fit.notes), shrunken
-
-
-OVERLOOKED = 2
-"""Terms at most that the likelihood adds."""
-_BY_LIKELIHOOD = "kept: what the likelihood leaves of the torque depends on it"
-_ZERO = "left out: the fit finds it to be zero within its error"
-
-
-def revised(
-    fit: Fit, chosen: Selection, settings: Settings, refit: Callable[[Selection], Fit]
-) -> tuple[Fit, Selection]:
-    """The fit with the terms that it shows itself, where the logs chose them.
-
-    The first pass weighs by noise levels that the fit improves, and linearises elsewhere. Where the
-    likelihood is refuted, terms that its residual shows are added, if it stands with them: else
-    what the arm has is no term, or several. Of one that stands those are left out that are not
-    worth their price.
-    """
-    if chosen.chosen_by != "logs":
-        return fit, chosen
-    richer, better = chosen, fit
-    for _ in range(OVERLOOKED):
-        added = _most_evident(better.misfit, richer)
-        if added is None:
-            break
-        richer = richer.changed((added,), _BY_LIKELIHOOD, kept=True)
-        better = refit(richer)
-        if better.converged and not better.refuted:
-            fit, chosen = better, richer
-            break
-    nothing = _insignificant(chosen, fit).difference(settings.terms)
-    if nothing and not fit.refuted:
-        poorer = chosen.changed(nothing, _ZERO, kept=False)
-        other = refit(poorer)
-        if not other.refuted:
-            return other, poorer
-    return fit, chosen
-
-
-def _most_evident(misfit: Misfit | None, chosen: Selection) -> str | None:
-    """The left-out term that the likelihood's residual shows most, if its value is plausible."""
-    if misfit is None:
-        return None
-    left = {trial.term for trial in chosen.trials if not trial.kept}
-    least = level("REFUTED") / max(1, len(misfit.overlooked))
-    seen = [
-        (one.p_value, one.term)
-        for one in misfit.overlooked
-        if one.term in left
-        and has_need(one.term, chosen.model.terms)
-        and one.p_value < least
-        and plausible(one.values)
-    ]
-    return min(seen)[1] if seen else None
-
-
-def _insignificant(chosen: Selection, fit: Fit) -> set[str]:
-    """Terms of the fit none of whose coefficients has t² > ln N + 2 ln T, N samples, T terms."""
-    least = np.sqrt(price(1, max(2, fit.freedom), len(CHOICE)))
-    size = dict(zip(fit.names, np.abs(fit.values) / np.maximum(fit.std, 1e-300), strict=True))
-    # the arm's constants would move without what was kept in spite of its price
-    needed = {trial.term for trial in chosen.trials if trial.kept and trial.evidence <= 0}
-    needed |= {EVERY_TERM[other].needs or "" for other in chosen.model.terms}
-    present = chosen.model.terms
-    if chosen.delay and chosen.undetermined is None:
-        present += DELAYS
-    terms = set()
-    for name in outside(present, needed):
-        term = EVERY_TERM[name]
-        if term.sines and "y_p" in fit.shared.body:  # the payload's offset shows in them
-            continue
-        if max(size.get(parameter, 0.0) for parameter in term.names) < least:
-            terms.add(name)
-    return terms

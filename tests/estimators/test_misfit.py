@@ -4,23 +4,28 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
 from algid.arm import FloatArray
-from algid.estimators.misfit import columns, lacking, misfit
+from algid.base.names import vector
+from algid.estimators.elastic import flexed
+from algid.estimators.log_likelihood import Beside
+from algid.estimators.misfit import misfit, shapes
+from algid.estimators.parametrisation import Shared
+from algid.estimators.terms import Products
+from algid.estimators.whitening import modelled
 from algid.identification.identify import identify
-from algid.model import RIGID, TERMS, Model, Motion, regressor, torque
+from algid.model import RIGID, TERMS, Model, Motion, torque
 from algid.settings import Settings
 from pipelines import conventions, planar
 from pipelines import misfit as scenes
 from pipelines.accuracy_scenes import case_of
 from tests.intervals import distances
 
-K = np.array([8e-4, 0.05, 2e-3, 0.42, 5.5e-3, 0.136, 0.31])
+DT = 1e-3
+C = np.array([8e-4, 0.05, 2e-3, 0.42, 5.5e-3, 0.136, 0.31, 0.1, 0.05])
 
 
 def motion_of(count: int = 400) -> Motion:
@@ -30,21 +35,26 @@ def motion_of(count: int = 400) -> Motion:
 
 def told(
     model: Model, c: FloatArray, motion: Motion, beside: FloatArray, *, delay: bool = False
-) -> Any:
+) -> tuple[Products, float]:
     """The test of a log with white noise of unit deviation, and with the torque `beside`."""
     rng = np.random.default_rng(6)
-    Y = regressor(model, motion, c)
-    error = rng.standard_normal(motion.theta.shape) + beside
-    blocks = [Y.swapaxes(0, 1), error[None], columns(model, c, motion, 1e-3)]
-    rows = np.concatenate([block.reshape(len(block), -1) for block in blocks])
-    fit = SimpleNamespace(
-        names=model.names,
-        values=c,
-        shared=SimpleNamespace(
-            model=model, delay=delay, jacobian=lambda _c, _loaded: np.eye(len(c))
-        ),
-    )
-    return rows, misfit(fit, [(False, rows @ rows.T)], None)  # type: ignore[arg-type]
+    shared, error = Shared(model, delay), rng.standard_normal(motion.theta.shape) + beside
+    at = {False: np.append(c, 0.0) if delay else c}
+
+    def products(whole: Shared, c: FloatArray, more: Beside) -> tuple[FloatArray, float]:
+        c = c[:-1]
+        bent = flexed(whole.model, c, motion, DT)
+        J, tau = modelled(whole.model, c, bent, DT)
+        late = np.gradient(tau, DT, axis=1)
+        blocks = J.swapaxes(0, 1), late[None], error[None], more(whole.model, c, bent, DT)
+        rows = np.concatenate(blocks).swapaxes(0, 1)
+        return rows @ rows.swapaxes(1, 2), 0.0
+
+    log = SimpleNamespace(products=products, loaded=False, trained=motion.theta.shape[1])
+    log.kept = [SimpleNamespace(dt=DT, tau=np.ones((2, 1)))]
+    found = Products([log], shared, at, 0.0, shapes)  # type: ignore[list-item]
+    fit = SimpleNamespace(names=shared.names, values=at[False], shared=shared)
+    return found, misfit(fit, found, None)  # type: ignore[arg-type]
 
 
 def squares(columns: FloatArray, e: FloatArray) -> float:
@@ -55,49 +65,37 @@ def squares(columns: FloatArray, e: FloatArray) -> float:
 
 
 @pytest.mark.parametrize("term", ["offset", "stribeck", "load", "phases"])
-def test_the_statistic_of_a_term_is_what_least_squares_with_it_explains(term: str) -> None:
-    model = Model(("coulomb",))
-    c = np.array([*K, 0.1, 0.05])
-    motion = motion_of()
-    rows, found = told(model, c, motion, np.zeros((2, 400)))
-    q, pairs = len(c), lacking(model)
-    Y, e, G = rows[:q], rows[q], rows[q + 1 :]
+def test_a_term_explains_what_least_squares_with_it_does(term: str) -> None:
+    model, motion = Model(("coulomb",)), motion_of()
+    found, _ = told(model, C, motion, np.zeros((2, 400)))
+    wide = replace(model, terms=("coulomb", term))
+    c = vector(wide.names, dict(zip(model.names, C.tolist(), strict=True)), otherwise=0.0)
+    J, tau = modelled(wide, c, motion, DT)
     wider = replace(model, coulomb_speed=model.coulomb_speed * 1.001)
     narrower = replace(model, coulomb_speed=model.coulomb_speed / 1.001)
-    width = (torque(wider, c, motion) - torque(narrower, c, motion)).ravel()
-    own = [place for place, pair in enumerate(pairs) if pair[0] == term]
-    plain = np.vstack([Y, width])
-    explained = squares(plain, e) - squares(np.vstack([plain, G[own]]), e)
-    (one,) = (each for each in found.overlooked if each.term == term)
-    assert one.p_value == pytest.approx(chi2.sf(explained, len(own)), rel=1e-3)
-    assert list(one.values) == list(TERMS[term].names)
+    width = (torque(wider, C, motion) - torque(narrower, C, motion))[None]
+    both = np.concatenate([J.swapaxes(0, 1), width]).reshape(-1, 800)
+    own = [name in TERMS[term].names for name in wide.names] + [False]
+    e = (tau + np.random.default_rng(6).standard_normal(tau.shape)).ravel()
+    explained = squares(both[~np.array(own)], e) - squares(both, e)
+    _, without, _ = found.solve(found.columns(["coulomb"]))
+    _, left, _ = found.solve(found.columns(["coulomb", term]))
+    assert without - left == pytest.approx(explained, rel=1e-3)
 
 
 @pytest.mark.parametrize("delay", [False, True])
-def test_a_delay_is_overlooked_where_none_is_estimated(delay: bool) -> None:
-    """The torque acts 5 ms late: beside an estimated delay its slow part shows no other."""
-    c, motion = np.array([*K, 0.1, 0.05]), motion_of()
-    model = Model(("coulomb",))
-    late = np.gradient(torque(model, c, motion), 1e-3, axis=1) * 5e-3
-    _, found = told(model, c, motion, late, delay=delay)
-    assert ("delay" in {one.term for one in found.overlooked}) is not delay
+def test_a_delay_is_a_misfit_where_none_is_estimated(delay: bool) -> None:
+    """The torque acts 5 ms late: beside an estimated delay nothing is left of it."""
+    motion, model = motion_of(), Model(("coulomb",))
+    late = np.gradient(torque(model, C, motion), DT, axis=1) * 5e-3
+    _, p_value = told(model, C, motion, late, delay=delay)
+    assert (p_value < 1e-4) is not delay
 
 
 def test_white_noise_is_no_misfit_and_a_shape_of_no_term_is() -> None:
-    c, motion = np.array([*K, 0.1, 0.05]), motion_of()
-    model = Model(("coulomb",))
-    assert not told(model, c, motion, np.zeros((2, 400)))[1].significant
-    spring = 0.6 * np.sin(2 * motion.theta)
-    assert told(model, c, motion, spring)[1].significant
-
-
-def test_a_term_that_is_missing_is_the_most_evident_and_its_value_right() -> None:
-    c, motion = np.array([*K, 0.1, 0.05]), motion_of()
-    offset = np.array([[0.5], [-0.4]]) * np.ones((2, 400))
-    seen = told(Model(("coulomb",)), c, motion, offset)[1]
-    best = min(seen.overlooked, key=lambda one: one.p_value)
-    assert best.term == "offset"
-    assert best.values == pytest.approx({"o1": 0.5, "o2": -0.4}, abs=0.2)
+    motion, model = motion_of(), Model(("coulomb",))
+    assert told(model, C, motion, np.zeros((2, 400)))[1] > 0.01
+    assert told(model, C, motion, 0.6 * np.sin(2 * motion.theta))[1] < 1e-4
 
 
 @pytest.mark.slow
