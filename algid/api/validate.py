@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api import Answer
 from algid.api.options import AnyResult, LogOptions, Logs, ProfileLike, called, meant, opened, verb
 from algid.base.errors import Exit, SettingError
 from algid.base.limits import within
+from algid.notices import Notice
 from algid.options import Option, flag
 from algid.results import Result
 from algid.results.verdict import judged_errors
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from algid.base.progress import Progress
     from algid.identification.validate import Validated
     from algid.report.document import Table
+
+DOUBTFUL = 0.1
+"""Of a torque's RMS: a prediction that misses more asks how its logs were read."""
 
 
 @verb
@@ -109,14 +113,19 @@ def validate(
         own = reused(own, known, file)
         model = predictor_of(as_logged(known, own), file)
     gravity = model.model.gravity
-    survey = Recordings(open_sources(logs, loaded, own), progress, gravity)
+    effort = None if own is None else own.effort
+    survey = Recordings(open_sources(logs, loaded, own), progress, gravity, effort)
     survey.begin("prediction")
     found = predicted(model, survey, simulate=simulate)
-    warnings = list[str]()
+    notices = list[Notice]()
     if known is not None:
-        summaries = list(map(survey.summary, survey.logs))
-        warnings = [one.sentence for one in read_otherwise(summaries, known, file)]
-    return replace(found, warnings=tuple(warnings), max_nrmse=max_nrmse, judged=judged)
+        notices += read_otherwise(list(map(survey.summary, survey.logs)), known, file)
+    doubtful = found.total is None or max(found.total.nrmse) > DOUBTFUL
+    for log in survey.logs:
+        name = PurePath(log.name).name
+        notices += [one.of(name) for one in survey.notices(log, doubtful=doubtful)]
+    warnings = tuple(one.sentence for one in notices if not one.note)
+    return replace(found, warnings=warnings, max_nrmse=max_nrmse, judged=judged)
 
 
 def answer(found: Validated, given: Mapping[str, Any]) -> Answer:

@@ -77,6 +77,20 @@ def test_another_effort_of_later_logs_is_predicted_without_what_it_lacks(
         assert max(total.nrmse) < 0.01
 
 
+def test_what_is_wrong_with_a_log_is_told_beside_its_prediction(
+    moon: tuple[algid.Result, Log, Log],
+) -> None:
+    arm, unloaded, _ = moon
+    q, tau = unloaded.theta + [[np.pi / 2], [0.0]], unloaded.tau.copy()
+    assert algid.validate(arm, unloaded).warnings == ()
+    (told,) = algid.validate(arm, Log.from_arrays(unloaded.t, q, tau, name="hung")).warnings
+    assert told.startswith("hung: θ1 is zero where link 1 is hanging")
+    assert told.endswith("--zero hanging")
+    masked = np.ma.masked_array(tau, np.arange(tau.size).reshape(tau.shape) % 3 == 0)
+    lossy = {"t": unloaded.t, "q": unloaded.theta, "tau": masked}
+    assert any("dropped for want of a value" in one for one in algid.validate(arm, lossy).warnings)
+
+
 def test_what_no_log_holds_is_told_by_convert(tmp_path: Path) -> None:
     algid.synthesise("case1", out=tmp_path, format="csv")
     source, out = tmp_path / "case1-unloaded.csv", tmp_path / "new.csv"
