@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @verb
 def identify(
-    unloaded: Logs | None,
+    unloaded: Logs | None = None,
     loaded: Logs | None = None,
     settings: Settings | None = None,
     *,
@@ -133,7 +133,7 @@ def identify(
 def typed(given: dict[str, Any]) -> dict[str, Any]:
     """What a command gives: beside the parameters of an arm its logs are of the loaded one."""
     if "parameters" in given:
-        loaded = [*given["unloaded"], *given.get("loaded", ())]
+        loaded = [*given.get("unloaded", ()), *given.get("loaded", ())]
         return given | {"unloaded": None, "loaded": loaded}
     return given
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,11 +20,13 @@ from algid.inspection.checks import inspect_log
 from algid.log import Log
 from algid.notices import has_code
 from algid.profile import Profile
-from algid.results import Result
+from algid.results import Result, read_result
 from algid.settings import Settings
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
+from algid.writers import write_log
+from tests.cli.commands import call
 from tests.golden.scenes import log_of, times
 from tests.intervals import distances
 from tests.readers.headers import opened
@@ -158,8 +161,11 @@ def test_a_force_sensor_that_rests_is_no_fault() -> None:
     assert has_code(inspect_log(resting).findings, "SENSOR_FAULT")
 
 
-def test_external_torque_needs_no_unloaded_log() -> None:
-    result = identify(None, logs("external")[1], report=False, effort="external")
+def test_external_torque_needs_no_unloaded_log(tmp_path: Path) -> None:
+    write_log(tmp_path / "arm.csv", logs("external")[1])
+    typed = ["--loaded", str(tmp_path / "arm.csv"), "--effort", "external", "--no-report"]
+    assert call("identify", *typed, "-o", str(tmp_path)).code == 0
+    result = read_result(tmp_path / "arm.algid")
     right(result)
     assert set(result.parameters) <= {"o1", "o2", "delay"}
 
@@ -177,13 +183,13 @@ def test_a_result_of_compensated_torque_predicts_weighs_and_serves_later_payload
 
 
 def test_contradictions_have_one_line() -> None:
-    for call in (
+    for wrong in (
         lambda: Settings(effort="external", gravity=1.62),
         lambda: identify(logs("raw")[0], profile={"effort": "external", "gravity": 9.7}),
         lambda: Settings(effort="friction-compensated", model="coulomb"),
     ):
         with pytest.raises(SettingError, match=r"^--(effort external|model): ") as raised:
-            call()
+            wrong()
         assert "\n" not in str(raised.value)
     with pytest.raises(SettingError, match=r"or --effort external, found unloaded ones alone$"):
         identify(logs("raw")[0], effort="external")
