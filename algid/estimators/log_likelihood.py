@@ -236,8 +236,8 @@ class LogEvidence:
     def products(self, shared: Shared, c: FloatArray, beside: Beside) -> tuple[FloatArray, float]:
         """Products (2, m, m) by joint of the training set's whitened columns at `c` of `shared`.
 
-        The residual's column follows those of the q coefficients, then come torques `beside` the
-        model's. With them the logarithm of the covariance's determinant.
+        Torques `beside` the model's follow those of the q coefficients, the residual is last. With
+        them the logarithm of the covariance's determinant.
         """
         gram, determinant, model = np.zeros(()), 0.0, shared.model
         for piece, theta in zip(self.kept, self._trajectories, strict=True):
@@ -245,7 +245,8 @@ class LogEvidence:
             made = beside(model, c[: len(model.names)], linear.motion, piece.dt)
             rows = (made / self.noise.tau[None, :, None]).swapaxes(1, 2)
             rows = np.ascontiguousarray(rows).reshape(rows.shape[0], -1)
-            columns = np.concatenate([linear.columns, linear.solve_in_place(rows)])
+            residual, own = linear.columns[-1:], linear.columns[:-1]
+            columns = np.concatenate([own, linear.solve_in_place(rows), residual])
             by_joint = columns.reshape(len(columns), -1, 2).transpose(2, 0, 1)
             gram = gram + by_joint @ by_joint.swapaxes(1, 2)
             determinant += 2 * float(np.log(linear.factor[-1]).sum())

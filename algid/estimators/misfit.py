@@ -32,10 +32,10 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.base.compiled import chi2_tail
-from algid.base.names import outside, places_outside
+from algid.base.names import places_outside
 from algid.estimators.combine import Prior, scaled_pinv
 from algid.estimators.fit import Fit
-from algid.estimators.terms import TERM_OF, WIDTHS, Products
+from algid.estimators.terms import TERM_OF, WIDTHS, Products, widened
 from algid.model import Model, Motion, regressor, smooth_sign
 
 
@@ -74,10 +74,10 @@ _ALIKE = 1e-5
 """Share of the largest eigenvalue: along smaller ones the torques repeat each other."""
 
 
-def shapes(model: Model, c: FloatArray, motion: Motion, _dt: float) -> FloatArray:
-    """Torques (m, 2, n) of one joint each, in shapes that no term has."""
+def shapes(model: Model, c: FloatArray, motion: Motion, dt: float) -> FloatArray:
+    """What friction's widths change, and torques of one joint each in shapes that no term has."""
     modelled, signs = _acting(model, c, motion), [smooth_sign(model, w) for w in motion.omega]
-    made = []
+    made = [*widened(model, c, motion, dt)]
     for joint, other in ((0, 1), (1, 0)):
         own = motion.theta[joint], motion.omega[joint], signs[joint]
         seen = _Joint(modelled[joint], *own, signs[other], motion.omega[other], motion.alpha[other])
@@ -112,33 +112,30 @@ def misfit(fit: Fit, products: Products, prior: Prior | None) -> float:
     prior : Prior, optional
         What held the fit beside its logs.
     """
-    shared, names = fit.shared, products.names
+    shared, names, kinds = fit.shared, products.names, 2 * [kind for kind, _ in _SHAPES]
+    present = [names.index(name) for name in shared.log_names]
+    absent = places_outside(names, [*shared.log_names, *WIDTHS])
+    # friction's widths are estimated beside the parameters
+    free = [names.index(name) for name in WIDTHS]
+    rest = [*free, -1, *absent, *range(len(names), len(names) + len(kinds))]
     Q, whole = len(fit.names), np.zeros(())
-    other = places_outside(names, shared.log_names)
     for loaded, gram in products.each:
-        by_shared = np.zeros((len(gram), Q + 1 + len(gram) - 1 - len(shared.log_names)))
-        of_model = [names.index(name) for name in shared.log_names]
-        by_shared[of_model, :Q] = shared.jacobian(fit.values, loaded)
-        rest = [len(names), *other, *range(len(names) + 1, len(gram))]
+        by_shared = np.zeros((len(gram), Q + len(rest)))
+        by_shared[present, :Q] = shared.jacobian(fit.values, loaded)
         by_shared[rest, Q + np.arange(len(rest))] = 1
         whole = whole + by_shared.T @ gram @ by_shared
-    S, X, G = whole[:Q, :Q], whole[:Q, Q + 1 :], whole[Q + 1 :, Q + 1 :]
+    P = Q + len(free)
+    S, X, G = whole[:P, :P], whole[:P, P + 1 :], whole[P + 1 :, P + 1 :]
     if prior is not None:
         known = prior.places(fit.names)
         S[np.ix_(known, known)] += prior.precision
     D = scaled_pinv(S) @ X  # what the parameters take up
-    M, b = G - X.T @ D, whole[Q + 1 :, Q] - D.T @ whole[:Q, Q]
-    size = np.diag(G)
-    kinds = [TERM_OF.get(names[place], names[place]) for place in other]
-    kinds += 2 * [kind for kind, _ in _SHAPES]
-    # widths are estimated too
-    wide = np.array([kind in WIDTHS for kind in kinds])
-    shares = M[np.ix_(~wide, wide)] @ scaled_pinv(M[np.ix_(wide, wide)])
-    M, b = M[np.ix_(~wide, ~wide)] - shares @ M[np.ix_(wide, ~wide)], b[~wide] - shares @ b[wide]
-    beside = np.diag(M) > _OWN * size[~wide]
+    M, b = G - X.T @ D, whole[P + 1 :, P] - D.T @ whole[:P, P]
+    kinds = [TERM_OF[names[place]] for place in absent] + kinds
+    beside = np.diag(M) > _OWN * np.diag(G)
     freedom, statistic = _score(M, b, np.flatnonzero(beside))
     places: dict[str, list[int]] = {}
-    for place, kind in enumerate(outside(kinds, WIDTHS)):
+    for place, kind in enumerate(kinds):
         if beside[place]:
             places.setdefault(kind, []).append(place)
     alone = [1.0]

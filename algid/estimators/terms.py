@@ -165,15 +165,6 @@ def has_need(term: str, terms: Collection[str]) -> bool:
     return needed is None or needed in terms
 
 
-def plausible(values: Mapping[str, float]) -> bool:
-    """Whether coefficients, by name, are of a plausible size and sign."""
-    for name, value in values.items():
-        low, high = PARAMETERS[name].plausible
-        if not low <= value <= high:
-            return False
-    return True
-
-
 def _using(shape: str) -> tuple[str, ...]:
     """Terms that a width of friction shapes."""
     return tuple(name for name, term in TERMS.items() if shape in term.shapes)
@@ -272,7 +263,7 @@ _STEP = 1e-3
 """Relative change of a width of friction by which its effect is differentiated."""
 
 
-def _widened(model: Model, c: FloatArray, motion: Motion, _dt: float) -> FloatArray:
+def widened(model: Model, c: FloatArray, motion: Motion, _dt: float) -> FloatArray:
     """Derivatives (widths, 2, n) of the torque by the logarithms of friction's widths, in N m."""
     rows = []
     for width in WIDTHS:
@@ -296,11 +287,11 @@ class Products:
         Where it is linearised; those of other terms are zero.
     base : float, s
         The delay from which the column of the delay counts.
-    beside : Beside, optional
-        More torques, which are in `each` alone.
+    beside : Beside
+        `widened`, and what other torques are to be in `each`.
 
     `names` are those of the coefficients, of every term and widths; `each` has for a log whether it
-    is loaded, and the products of its columns, their residual and the torques beside them.
+    is loaded, and the products of its columns, the torques beside them and the residual.
     """
 
     def __init__(
@@ -309,7 +300,7 @@ class Products:
         shared: Shared,
         at: Mapping[bool, FloatArray],
         base: float,
-        beside: Beside | None = None,
+        beside: Beside = widened,
     ) -> None:
         own = shared.model.terms
         every = tuple(name for name, term in TERMS.items() if not term.lags or name in own)
@@ -323,24 +314,13 @@ class Products:
         self.determinant = 0.0
         self.each: list[tuple[bool, FloatArray]] = []
         grams, q = [], len(self.shared.log_names)
-
-        def torques(model: Model, c: FloatArray, motion: Motion, dt: float) -> FloatArray:
-            widened = _widened(model, c, motion, dt)
-            if beside is None:
-                return widened
-            return np.concatenate([widened, beside(model, c, motion, dt)])
-
         driven = [
             any(np.any(piece.tau[joint]) for log in logs for piece in log.kept) for joint in (0, 1)
         ]
         for log in logs:
             known = dict(zip(shared.log_names, at[log.loaded].tolist(), strict=True))
             c = vector(self.names, {DELAYS[0]: base, **known}, otherwise=0.0)
-            gram, determinant = log.products(self.shared, c[:q], torques)
-            # widths stand with the coefficients, before the residual
-            rows = np.arange(gram.shape[-1])
-            rows[q : len(self.names) + 1] = [*range(q + 1, len(self.names) + 1), q]
-            gram = gram[:, rows[:, None], rows]
+            gram, determinant = log.products(self.shared, c[:q], beside)
             if not all(driven):
                 # where a joint has no motor, its gain is nothing and makes its equation vanish
                 for name, _ in attributes(self.shared.model, "gains"):
@@ -348,11 +328,12 @@ class Products:
             self.determinant += determinant
             self.each.append((log.loaded, gram.sum(axis=0)))
             # the torque itself in the place of what the point of linearisation leaves of it
-            change = np.eye(len(self.names) + 1)
-            change[:-1, -1] = c
-            change[q - 1, -1] -= base
-            own_gram = gram[:, : len(change), : len(change)]
-            grams.append(self._wide(log.loaded, change.T @ own_gram @ change))
+            c[q - 1] -= base
+            to_p = np.zeros((gram.shape[-1], self.size + 1))
+            to_p[np.arange(c.size), self._places(log.loaded)] = 1
+            to_p[: c.size, -1] = c
+            to_p[-1, -1] = 1
+            grams.append(to_p.T @ gram @ to_p)
         self._grams = np.array(grams)
         self.total = self._grams.sum(axis=(0, 1))
         self.samples = sum(log.trained for log in logs)
@@ -367,13 +348,6 @@ class Products:
         if loaded and self._both:
             places[self._rigid] = len(self.names) + np.arange(len(self._rigid))
         return places
-
-    def _wide(self, loaded: bool, gram: FloatArray) -> FloatArray:
-        """Products (2, P + 1, P + 1) in p of a log's (2, q + 1, q + 1)."""
-        rows = np.append(self._places(loaded), self.size)
-        wide = np.zeros((2, self.size + 1, self.size + 1))
-        wide[:, rows[:, None], rows] = gram
-        return wide
 
     def columns(self, terms: Iterable[str]) -> NDArray[np.int64]:
         """Places in p of eq. (1), of `terms` and of their widths."""
@@ -483,11 +457,13 @@ class _Search:
         p, _, _ = self.first.solve(self.first.columns([*beside, term]))
         c = self.first.coefficients(p)[False]
         value = dict(zip(self.first.shared.log_names, c.tolist(), strict=True))
-        own = set(EVERY_TERM[term].names).difference(self.absent).intersection(value)
-        for name in own.intersection(SINES):
-            if np.arctan2(abs(value[name]), value[SINES[name]]) > LARGEST_PHASE:
+        for name in set(EVERY_TERM[term].names).difference(self.absent).intersection(value):
+            low, high = PARAMETERS[name].plausible
+            if not low <= value[name] <= high:
                 return False
-        return plausible({name: value[name] for name in own})
+            if name in SINES and np.arctan2(abs(value[name]), value[SINES[name]]) > LARGEST_PHASE:
+                return False
+        return True
 
     def is_needed(self, term: str, beside: Sequence[str]) -> bool:
         """Whether `term` is a rotor that the log suspects, and without which k1 … k5 move.

@@ -46,7 +46,7 @@ def told(
         bent = flexed(whole.model, c, motion, DT)
         J, tau = modelled(whole.model, c, bent, DT)
         late = np.gradient(tau, DT, axis=1)
-        blocks = J.swapaxes(0, 1), late[None], error[None], more(whole.model, c, bent, DT)
+        blocks = J.swapaxes(0, 1), late[None], more(whole.model, c, bent, DT), error[None]
         rows = np.concatenate(blocks).swapaxes(0, 1)
         return rows @ rows.swapaxes(1, 2), 0.0
 
