@@ -37,7 +37,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "identification": ("identification", "golden"),
     "inspection": ("inspection", "golden"),
     "physics": ("physics", "estimators/test_model.py", "golden"),
-    "readers": ("readers",),
+    "readers": ("readers", "golden"),
     "report": ("report", "test_verbs.py"),
     "signals": ("signals", "golden"),
     "synth": ("synth", "cli/test_ends.py"),

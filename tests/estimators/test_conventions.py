@@ -77,7 +77,6 @@ def test_the_convention_that_is_named_undoes_the_mistake(bench: Bench, row: str)
     theta, tau = measured(bench.bare)
     wrong = spoiled(row, theta, tau)
     found = judge_together([Recorded(*wrong, DT, None, *READ.get(row, ()))])
-    assert found is not None
     assert found.alone
     assert found.best.convention != AS_READ
     mends = [found.best.convention, found.best.convention.mirrored()]

@@ -118,7 +118,6 @@ def test_weight_that_is_said_not_to_be_there_is_named(said: dict[str, Any]) -> N
     assert found.verdict.failed
     assert "weight" in found.verdict.reasons[0].text
     remedy = found.verdict.reasons[0].remedy
-    assert remedy is not None
     assert identify(log, report=False, **said | remedy.keywords).verdict.grade == "good"
 
 
