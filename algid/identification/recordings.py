@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
@@ -184,8 +185,12 @@ def open_sources(
     loaded: LogLike | Iterable[LogLike] | None,
     profile: Profile | None = None,
 ) -> list[Recording]:
-    """Sources of one log, several, or none of each role, unloaded ones first: see `open_source`."""
+    """Sources of one log, several, or none of each role, unloaded ones first: see `open_source`.
+
+    Of logs in memory that have one name the later ones are numbered.
+    """
     sources: list[Recording] = []
+    called = Counter[str]()
     both: tuple[tuple[Role, LogLike | Iterable[LogLike] | None], ...]
     both = (("unloaded", unloaded), ("loaded", loaded))
     for role, logs in both:
@@ -195,7 +200,12 @@ def open_sources(
             logs = [logs]
         if not isinstance(logs, Iterable):
             refuse_others(logs)
-        sources += [open_source(log, role, profile) for log in logs]
+        for log in logs:
+            source = open_source(log, role, profile)
+            called[source.name] += 1
+            if called[source.name] > 1 and not isinstance(log, str | Path | Staged):
+                source.name += f" ({called[source.name]})"
+            sources.append(source)
     return sources
 
 

@@ -89,6 +89,17 @@ def test_what_is_wrong_with_a_log_is_told_beside_its_prediction(
     assert any("dropped for want of a value" in one for one in algid.validate(arm, lossy).warnings)
 
 
+def test_logs_in_memory_of_one_name_are_predicted_one_by_one(
+    moon: tuple[algid.Result, Log, Log],
+) -> None:
+    arm, unloaded, _ = moon
+    frames = [
+        {"t": one.t, "q": one.theta, "tau": one.tau}
+        for one in (unloaded.part(0, 300), unloaded.part(300, 601))
+    ]
+    assert [*algid.validate(arm, frames).logs] == ["log", "log (2)"]
+
+
 def test_what_no_log_holds_is_told_by_convert(tmp_path: Path) -> None:
     algid.synthesise("case1", out=tmp_path, format="csv")
     source, out = tmp_path / "case1-unloaded.csv", tmp_path / "new.csv"
