@@ -51,7 +51,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "errors files limits methods model options physics profile signals", "pydantic"
     ),
     "results": room(
-        "criteria errors files log model names notices options settings significance text",
+        "criteria errors files log model names notices options physics settings significance text",
         "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm estimators limits log model names results synth"),

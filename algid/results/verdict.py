@@ -30,6 +30,7 @@ from algid.notices import (
     warnings_of,
 )
 from algid.options import SET, flag
+from algid.physics.parameters import BODY
 
 if TYPE_CHECKING:
     from algid.results.model import Estimate, Result, TorquePrediction
@@ -186,15 +187,16 @@ def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
 
 
 def requested(result: Result) -> dict[str, Estimate]:
-    """The estimates that were asked for: without shrunk terms and terms that the logs have chosen.
+    """The estimates that were asked for: without shrunk terms and what the logs have chosen.
 
-    Such a term is there for the sake of the others. That its own coefficients are small beside
-    their error bars is no reason to doubt those. Phases are, since they say how the arm is bent.
+    Such a term, or a payload's offset or inertia, is there for the sake of the others. That its own
+    coefficients are small beside their error bars is no reason to doubt those. Phases are, since
+    they say how the arm is bent.
     """
     model = result.torque_model
     if model is None:
         return result.estimates
-    own = list(model.shrunk)
+    own = [*model.shrunk, *(one.name for one in BODY)]
     if model.chosen_by == "logs":
         for term in (EVERY_TERM[name] for name in CHOICES):
             own += () if term.sines else term.names
@@ -214,7 +216,7 @@ def _identified(result: Result, *, praise: bool) -> str:
         have += f" by the {visible(result.estimator)} estimator in place of the {asked} one"
     widths = {
         one.half / abs(one.estimate): name
-        for name, one in estimates.items()
+        for name, one in requested(result).items()
         if one.half is not None and one.estimate
     }
     if praise and widths:
