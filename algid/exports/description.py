@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,7 @@ from algid.identification.known import (
     model_of,
     payload_length,
     torque_constants,
+    untold,
     with_error_bar,
     wrong_inertia,
 )
@@ -118,6 +119,8 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
         If what is known leaves no positive mass or inertia.
     """
     model, known = model_of(result), given_lengths(result) | {**knowns}
+    if K2 in untold(result, model):
+        model = replace(model, gravity=0.0)  # as its driver has it: nothing of the weight is known
     l1, told, second = known.get("l1"), ", g k1 / k2", result.payload.get("l2")
     tied = {"l2": second.estimate} if second and second.usable and second.estimate else {}
     if links and l1 is None:

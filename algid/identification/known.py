@@ -86,6 +86,11 @@ def as_logged(result: Result, profile: Profile) -> Result:
     return result.model_copy(update={"settings": result.settings | stated})
 
 
+def untold(result: Result, model: Model) -> tuple[str, ...]:
+    """What of the arm's `model` torques as the result's driver logs them do not hold."""
+    return absent(Settings.of(result.settings).effort, model.names)
+
+
 def shift_of(result: Result) -> TorqueShift:
     """After how long a logged torque acts: hold, and delay."""
     settings = Settings.of(result.settings)
@@ -112,7 +117,7 @@ def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
             "here too"
         )
     known = set(result.fit.covariance_names) & set(result.parameters)
-    gone = absent(Settings.of(result.settings).effort, model.names)
+    gone = untold(result, model)
     names = outside(model.names, gone)
     missing = outside(names, known)
     if missing:
@@ -150,7 +155,7 @@ def torque_constants(result: Result, model: Model, role: Role, file: str) -> Flo
     for name, one in (result.parameters | result.payload).items():
         if one.estimate is not None:
             known[name] = one.estimate
-    known |= dict.fromkeys(absent(Settings.of(result.settings).effort, model.names), 0.0)
+    known |= dict.fromkeys(untold(result, model), 0.0)
     known |= given_lengths(result)
     loaded = role == "loaded"
     body = within(BODY_PARAMETERS, known)

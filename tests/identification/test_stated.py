@@ -67,6 +67,15 @@ def test_another_effort_of_later_logs_is_predicted_without_what_it_lacks(
     floating = replace(unloaded, tau=unloaded.tau - weight)
     compensated = algid.validate(arm, floating, effort="gravity-compensated").total
     assert max(compensated.nrmse) < 0.01
+    light = algid.identify(
+        floating, effort="gravity-compensated", gravity=MOON, estimator="weak", model="plain"
+    )
+    held = algid.export(light, "urdf", l1=0.3)
+    assert "This file lacks what the driver takes off the torque" in held.text
+    (tmp_path / "light.urdf").write_text(held.text)
+    total = algid.validate(tmp_path / "light.urdf", floating, gravity=0.0).total
+    assert total is not None
+    assert max(total.nrmse) < 0.01
     file = tmp_path / "arm.urdf"
     algid.export(arm, "urdf", out=file)
     for log, effort in ((unloaded, None), (floating, "gravity-compensated")):
