@@ -19,6 +19,7 @@ from algid.estimators.fit import Fit
 from algid.estimators.hold import Hold
 from algid.estimators.terms import (
     CHOICE,
+    TERM_OF,
     Selection,
     TermTrial,
     needs_shape,
@@ -244,14 +245,14 @@ def _of_motorless(
     better = robust.of_passive_joint(problem_of(survey, settings, plainer, prior))
     if better is None:
         return fit, chosen
-
-    size = dict(zip(better.names, np.abs(better.values) / better.std, strict=True))
-    nothing = {
-        term
-        for term in outside(plainer.model.terms, settings.terms)
-        if max(size[name] for name in TERMS[term].names) < SURE
+    if plainer.chosen_by != "logs":
+        return better, plainer
+    sizes = np.abs(better.values) / np.maximum(better.std, 1e-300)
+    evident = {
+        TERM_OF[name] for name, size in zip(better.names, sizes, strict=True) if size >= SURE
     }
-    if nothing and plainer.chosen_by == "logs":
+    nothing = outside(plainer.model.terms, evident.union(settings.terms))
+    if nothing:
         poorer = plainer.changed(nothing, _ZERO, kept=False)
         without = robust.of_passive_joint(problem_of(survey, settings, poorer, prior))
         if without is not None:
