@@ -35,7 +35,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.arm import FloatArray
+from algid.arm import FloatArray, keep_arrays
 from algid.base.compiled import chi2_exceeded
 from algid.base.names import evenly_spread, outside, vector, within
 from algid.base.significance import level
@@ -341,6 +341,7 @@ class Products:
         of_delay = self.names.index(DELAYS[0])
         self.open_squares = (_STAMPS * self.dt) ** 2 * float(self.total[of_delay, of_delay])
         self.noisy = self.open_squares < self.samples
+        keep_arrays(self)  # a fit hands it on
 
     def _places(self, loaded: bool) -> NDArray[np.int64]:
         """Where a log's coefficients and widths stand in p."""
