@@ -41,6 +41,8 @@ ERRORS: dict[str, Error] = {
         np.sqrt(2) * np.sin(q - 0.7) * np.tanh(w / WIDTH)
     ),
     "a belt that rubs on the other joint": lambda _, w, *__: -np.tanh((w - w[::-1]) / (2 * WIDTH)),
+    "a spring from the hanging arm": lambda q, *_: HANGING[:, None] - q,
+    "a driver's dead band": lambda _, __, u, size: -np.tanh(20 * u / size),
 }
 SHARES = (0.003, 0.01, 0.03)
 

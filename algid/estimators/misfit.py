@@ -8,8 +8,9 @@ test (1948) sees it: of torques G that a motion makes, beside those of the model
 
 and W is χ² of rank(M) degrees of freedom where the model holds. G has the columns of the terms
 that the model is without, one of a delay, and shapes that no term has: friction of gears by all
-torque that passes them, a motor that saturates, drag of the air, cogging and cables' pull by the
-joint's angle, friction that changes along a turn, and what one drive does to the other joint.
+torque that passes them, a motor that saturates or has a dead band, drag of the air, cogging and
+cables' pull by the joint's angle, friction that changes along a turn, and what one drive does to
+the other joint.
 
 A controller makes torque of its encoders' noise, which the residual holds too: that they correlate
 looks like a delay of the torque. Such a torque is fast: the columns are those of the smooth motion.
@@ -54,6 +55,7 @@ class _Joint(NamedTuple):
 _SHAPES: tuple[tuple[str, Callable[[_Joint], FloatArray]], ...] = (
     ("gears", lambda j: np.abs(j.T) * j.sign),
     ("saturation", lambda j: np.abs(j.T) * j.T),
+    ("dead band", lambda j: np.sign(j.T)),
     ("drag", lambda j: np.abs(j.omega) * j.omega),
     ("once a turn", lambda j: np.sin(j.theta)),
     ("once a turn", lambda j: np.cos(j.theta)),
@@ -76,16 +78,22 @@ _ALIKE = 1e-5
 
 def shapes(model: Model, c: FloatArray, motion: Motion, dt: float) -> FloatArray:
     """What friction's widths change, and torques of one joint each in shapes that no term has."""
-    modelled, signs = _acting(model, c, motion), [smooth_sign(model, w) for w in motion.omega]
-    made = [*widened(model, c, motion, dt)]
+    own = of_no_term(model, _acting(model, c, motion), motion)
+    return np.stack([*widened(model, c, motion, dt), *own])
+
+
+def of_no_term(model: Model, acting: FloatArray, motion: Motion) -> list[FloatArray]:
+    """Torques (2, n) of one joint each, in shapes that no term has, where (2, n) N m act."""
+    signs = [smooth_sign(model, omega) for omega in motion.omega]
+    made = []
     for joint, other in ((0, 1), (1, 0)):
         own = motion.theta[joint], motion.omega[joint], signs[joint]
-        seen = _Joint(modelled[joint], *own, signs[other], motion.omega[other], motion.alpha[other])
+        seen = _Joint(acting[joint], *own, signs[other], motion.omega[other], motion.alpha[other])
         for _, shape in _SHAPES:
-            row = np.zeros_like(modelled)
+            row = np.zeros_like(acting)
             row[joint] = shape(seen)
             made.append(row)
-    return np.stack(made)
+    return made
 
 
 def _acting(model: Model, c: FloatArray, motion: Motion) -> FloatArray:

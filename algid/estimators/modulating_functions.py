@@ -22,7 +22,7 @@ window.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 
@@ -215,6 +215,16 @@ class Windows:
         if delay:
             X[:, -2] = -tau_slope
         return X
+
+    def beside(
+        self, piece: Segment, made: Callable[[FloatArray, Motion], Sequence[FloatArray]]
+    ) -> FloatArray:
+        """Moments (2, m, R) of what is `made` of torques and motion of a piece with a window."""
+        theta = piece.theta[:, self.margin : len(piece) - self.margin]
+        omega = self._velocity(piece)
+        motion = Motion(theta, omega, np.gradient(omega, self.dt, axis=1))
+        rows = np.stack(made(self._acting(piece.tau), motion), axis=1)
+        return np.stack([self.moments(own, self._plain[0]) for own in rows])
 
     def columns(self, model: Model, motion: Motion) -> FloatArray:
         """Moments (2, q, R) of the model's columns along a motion with velocities, by windows."""

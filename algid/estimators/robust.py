@@ -16,6 +16,13 @@ left out. From four logs on, leaving them out shows how far an estimate moves wi
 lacks. With fewer, windows of half and of twice the length do: longer ones weigh slow errors more,
 shorter ones fast ones. The scatter of their estimates is added to the covariance.
 
+No window and no log shows what all of them have: a cable's pull looks like weight, and what a
+driver swallows like a larger arm. The torques G that `algid.estimators.misfit` holds a residual
+against show how far they may move an estimate: with a coefficient h of each, normal with a spread
+σ of `BESIDE` of the joint's torque, likelihoods are those of what h leaves of them,
+
+    S - BᵀQ,  g - QᵀGᵀe,   Q = (GᵀG + σ⁻²)⁻¹ B,   B = GᵀX
+
 **Endogenous torque.** Torque that the model lacks drives the motion, and least squares is
 attenuated by it. Instruments (`algid.estimators.instruments`) are not, as long as they do not
 answer that torque: the logged reference of a controller never does, the measured torque does not
@@ -33,6 +40,7 @@ v_l that of the products.
 symbol  name                                                             shape      unit
 ======  ===============================================================  =========  ===============
 S, g    information and score of all logs                                (Q, Q), Q  1 / (unit unit)
+X, G    columns of the parameters, and torques that no term has          (R, …)     N m / unit
 p       shared parameters where prior and logs meet                      (Q,)       mixed
 m, s    the prior's mean, and the spread that physics allows, of a term  (m,)       its own
 τ       the spread that the logs show, at most s                         (m,)       its own
@@ -74,13 +82,15 @@ from algid.estimators.diagnostics import broken_bounds
 from algid.estimators.excitation import undriven
 from algid.estimators.fit import Fit, finish, solved_anew
 from algid.estimators.instruments import Explained, followed
-from algid.estimators.modulating_functions import Known, row_weights
+from algid.estimators.misfit import of_no_term
+from algid.estimators.modulating_functions import Known, Windows, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
 from algid.estimators.repeats import Groups, grouped, merged, shared_out
 from algid.estimators.weak import Normal
 from algid.model import DELAYS, EVERY_TERM, K3, K5, RIGID, SINES, TERMS, attributes
 from algid.notices import Notice, Remedy
+from algid.signals.segments import Segment
 
 _ROUNDS = 3  # linearisations: the third moves nothing by a hundredth of a standard deviation
 _SOFT_ROUNDS = 5  # of them where joints are elastic
@@ -88,6 +98,8 @@ _MOST_KEPT = 1 << 20  # samples of all logs whose moments stay in memory, some 4
 _STEPS, _SETTLED = 200, 1e-3  # of expectation and maximisation, and change of log τ at the last
 _LEAST = 1e-4  # of s: a spread that counts as nothing
 _FEWEST = 3  # logs whose scatter shows an overdispersion
+BESIDE = 0.01
+"""Of a joint's torque, RMS: what a torque may be that no term has."""
 WINDOWS = (0.5, 2.0)
 """Of the windows' length: others that few logs are estimated by too."""
 ANSWERS = 0.01
@@ -124,7 +136,7 @@ def fit(problem: Problem) -> Fit:
         fit = robust.with_scatter(fit, least, [{"window": window} for window in WINDOWS])
     if attributes(least.shared.model, "by_load"):
         fit = robust.with_scatter(fit, least, [{"by_torque": True}])
-    return fit
+    return robust.with_scatter(fit, least, [{"beside": True}])
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,8 +206,13 @@ class RobustProblem:
             sum(normal.samples for normal in normals) <= _MOST_KEPT,
         )
 
-    def least_squares(self, window: float = 1.0, *, by_torque: bool = False) -> Fit:
-        """Every term shrunk, by windows of `window` times the settings' length."""
+    def least_squares(
+        self, window: float = 1.0, *, by_torque: bool = False, beside: bool = False
+    ) -> Fit:
+        """Every term shrunk, by windows of `window` times the settings' length.
+
+        Where asked for, `beside` torques that no term has.
+        """
         shared, known, settings = self.shared, self.problem.prior, self.problem.settings
         model = replace(settings.model, by_torque=by_torque)
         settings = replace(settings, window=window * settings.window, model=model)
@@ -221,7 +238,7 @@ class RobustProblem:
                 if shared.delay:
                     base = float(beta[columns])
                     settings = settings.delayed(base)
-                normals = self._normals(settings, at, memory)
+                normals = self._normals(settings, at, memory, beside=beside)
             expected = expectation(shared, first, settings, beta, known)
             if number == 0:
                 share = np.ones(len(expected.names))
@@ -235,12 +252,20 @@ class RobustProblem:
         settings: WeakSettings,
         at: Mapping[bool, FloatArray],
         memory: Sequence[dict[Hashable, Known] | None],
+        *,
+        beside: bool = False,
     ) -> dict[bool, list[Normal]]:
-        """Normal equations of unloaded and of loaded logs, linearised `at` coefficients (q,)."""
+        """Normal equations by kind `at` coefficients (q,), with shapes `beside` the model's."""
+
+        def others(piece: Segment, windows: Windows) -> FloatArray:
+            return windows.beside(piece, partial(of_no_term, settings.model))
+
         normals: dict[bool, list[Normal]] = {False: [], True: []}
         for place, source in enumerate(self.problem.logs):
             kind = place >= len(self.problem.unloaded)
-            normal = weak.normal_equations(source, settings, at.get(kind), memory[place])
+            normal = weak.normal_equations(
+                source, settings, at.get(kind), memory[place], others if beside else None
+            )
             if normal is None:
                 raise TooShortError(f"no {OF_A_WINDOW}")
             normals[kind].append(normal)
@@ -268,9 +293,10 @@ class RobustProblem:
                 c[-1] -= base
             for normal, counts in zip(own, driven[kind], strict=True):
                 gram = normal.gram.sum(axis=0)
-                weights = row_weights(gram, np.append(-c, 1.0), normal.rows)
-                log = weak.evidence(normal, np.where(counts, weights, 0.0), c, kind)
-                logs.append(replace(log, c0=c0))
+                wide = np.append(c, np.zeros(gram.shape[-1] - 1 - c.size))
+                weights = row_weights(gram, np.append(-wide, 1.0), normal.rows)
+                log = weak.evidence(normal, np.where(counts, weights, 0.0), wide, kind)
+                logs.append(replace(_marginal(log, normal, c.size), c0=c0))
         return self._divided(logs, beta)
 
     def _divided(self, logs: Sequence[LogInformation], beta: FloatArray) -> list[LogInformation]:
@@ -296,7 +322,7 @@ class RobustProblem:
         )
 
     def with_scatter(self, fit: Fit, least: Fit, others: Sequence[Mapping[str, Any]]) -> Fit:
-        """The fit with the scatter of n `others` beside `least`, of other windows or convention.
+        """The fit with the scatter of n `others` about `least`: settings of other least squares.
 
             W = V + Σ d dᵀ / n,   d = β_other − β, by least squares
 
@@ -356,6 +382,19 @@ class RobustProblem:
         if logs is None or len(logs) != len(least.logs) or least.shrinkage is None:
             return None
         return self._finished("instruments", self._divided(logs, at), at, least.shrinkage)
+
+
+def _marginal(log: LogInformation, normal: Normal, q: int) -> LogInformation:
+    """The likelihood of q coefficients, whatever those of the columns behind them are."""
+    sizes = np.sqrt(np.diagonal(normal.gram.sum(axis=0), axis1=1, axis2=2))
+    sizes = sizes / np.sqrt(np.maximum(normal.rows, 1.0))[:, None]
+    own, torque = sizes[:, q:-1], sizes[:, -1:]
+    spread = BESIDE * np.sum(np.divide(torque, own, out=np.zeros_like(own), where=own > 0), axis=0)
+    S, _ = log.total
+    K = np.eye(spread.size) + spread[:, None] * S[q:, q:] * spread
+    Q = np.linalg.solve(K, spread[:, None] * S[q:, :q])
+    T = np.concatenate([np.eye(q), -spread[:, None] * Q])
+    return replace(log, S=T.T @ log.S @ T + Q.T @ Q / len(log.S), g=log.g @ T)
 
 
 def offered(normals: Sequence[Normal], held: Sequence[str] = ()) -> tuple[str, ...]:

@@ -15,9 +15,19 @@ from algid.base.criteria import AT_REST
 from algid.estimators import instruments, robust, weak
 from algid.estimators.combine import LogInformation, Prior
 from algid.estimators.fit import Fit
+from algid.estimators.modulating_functions import OVERLAP
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem, Source, WeakSettings
-from algid.estimators.robust import WINDOWS, Expected, RobustProblem, _crossed, dispersion, shrink
+from algid.estimators.robust import (
+    BESIDE,
+    WINDOWS,
+    Expected,
+    RobustProblem,
+    _crossed,
+    _marginal,
+    dispersion,
+    shrink,
+)
 from algid.model import RIGID, Model
 from algid.signals.segments import Segment
 from pipelines.disturbed import DT, Scene, scene
@@ -204,6 +214,24 @@ def test_an_arm_without_unmodelled_torque_keeps_least_squares() -> None:
     assert found.notes == ()
     assert found.values == pytest.approx(least.values)
     assert found.endogeneity is not None
+
+
+def test_a_likelihood_beside_shapes_is_that_of_least_squares_with_their_prior() -> None:
+    rng = np.random.default_rng(4)
+    X = rng.standard_normal((2, 6, 40)) * np.array([1.0, 2.0, 3.0, 20.0, 0.1, 1.0])[:, None]
+    X[1, 3] = X[0, 4] = 0.0  # a shape is one joint's
+    normal = weak.Normal(weak.grams(X, 8), 0.01, 40, np.array([40.0, 40.0]), np.ones(2))
+    found = _marginal(weak.evidence(normal, np.ones(2), np.zeros(5), False), normal, 3)
+    torque, size = (np.sqrt(np.mean(X[[0, 1], own] ** 2, axis=1)) for own in (5, [3, 4]))
+    known = np.zeros((2, 5))
+    known[:, 3:] = np.diag(size / (BESIDE * torque))
+    rows = np.concatenate(
+        [*(np.sqrt(2 / OVERLAP) * X.swapaxes(1, 2)), np.pad(known, ((0, 0), (0, 1)))]
+    )
+    S = np.linalg.inv(rows[:, :5].T @ rows[:, :5])
+    np.testing.assert_allclose(np.linalg.inv(found.total[0]), S[:3, :3], rtol=1e-9)
+    estimate = np.linalg.solve(*found.total)
+    np.testing.assert_allclose(estimate, (S @ rows[:, :5].T @ rows[:, 5])[:3], rtol=1e-9)
 
 
 @pytest.mark.slow
