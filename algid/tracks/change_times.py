@@ -11,6 +11,11 @@ residual with it:
     h_s(t) = Σ_p w_p ½ (t + p − s)₊²,  w the stencil's weights of the second derivative, p its
     points
 
+Those differences mix the accelerations from before and behind the jump −M⁻¹ m g, with M before it
+and m the step of the mass. What a kilogram adds behind it is therefore not g as they see it, but
+
+    (1 + (1 − h) m G M⁻¹)⁻¹ g,  G the mass matrix of a kilogram at the tip
+
 A bracket holds the times whose likelihood ratio ξ is not beyond its 95 % quantile, P(ξ ≤ x) = (1 −
 e^(−x/2))² (Hansen 2000, Econometrica 68).
 """
@@ -24,6 +29,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.estimators.whitening import Linearised, modelled
+from algid.model import inertia
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.segments import Segment, append
 from algid.tracks.arm import IdentifiedArm
@@ -39,6 +45,7 @@ LIKELY = 7.352  # −2 ln(1 − √0.95)
 SAFE = 25.0  # ξ beyond which a time is out of the question
 CLUSTERED = 3.0  # times as much counts what is explained over the variance of clusters
 CLUSTER = 0.2  # s: of rows that may err alike
+_MOST_MOVES = 6  # of a change, until it stays
 _AT_ONCE = 32  # candidates whose columns are whitened together
 _FAR = 2**40  # samples: more than any log has
 
@@ -66,6 +73,7 @@ class Rows:
     dt : float, s
     g : (2, n), what a kilogram at the tip adds, over the torques' noise
     e : (2 n,), whitened, what the arm without payload leaves of the torque
+    jump : (2, 2, n), m G M⁻¹ in units of the torques' noise: see above
     linear : Linearised, which whitens
     """
 
@@ -73,6 +81,7 @@ class Rows:
     dt: float
     g: FloatArray
     e: FloatArray
+    jump: FloatArray
     linear: Linearised
 
     def whitened(self, rows: FloatArray) -> FloatArray:
@@ -83,7 +92,11 @@ class Rows:
     def steps(self, moments: FloatArray) -> FloatArray:
         """Columns (S, 2 n) of a kilogram that is grasped at each of `moments` (S,)."""
         h = step_response((self.t - moments[:, None]) / self.dt)
-        return self.whitened(self.g * h[:, None])
+        (a, b), (c, d) = (1 - h) * self.jump[:, :, None]
+        a, d = a + 1, d + 1
+        first, second = self.g
+        behind = np.stack([d * first - b * second, a * second - c * first], axis=1)
+        return self.whitened(behind * (h / (a * d - b * c))[:, None])
 
 
 def step_response(u: FloatArray) -> FloatArray:
@@ -114,7 +127,12 @@ def rows_of(
     linear = arm.linearised(piece, c)
     J, _ = modelled(arm.model, c, linear.motion, piece.dt)
     g = np.einsum("q,aqn->an", arm.unit, J) / arm.noise.tau[:, None]
-    rows = Rows(t, piece.dt, g, linear.columns[-1], linear)
+    before, theta = arm.k + arm.unit * masses[0], linear.motion.theta
+    G, M = (np.array(inertia(arm.model, one, theta)) for one in (arm.unit, before))
+    share = np.linalg.solve(M.transpose(2, 1, 0), G.transpose(2, 1, 0)).transpose(2, 1, 0)
+    share = share * arm.noise.tau[None, :, None] / arm.noise.tau[:, None, None]
+    jump = (masses[-1] - masses[0]) * share
+    rows = Rows(t, piece.dt, g, linear.columns[-1], jump, linear)
     return replace(rows, e=rows.e + rows.whitened((mass * g)[None])[0])
 
 
@@ -209,10 +227,16 @@ def confirmed(
         return place(rows, low, high, variance) if low < high else None
 
     def shift() -> None:
-        """Move each change to where the rows about it have it."""
-        for (at, _), rows in rows_about([(at, at) for at in range(len(places))]):
-            time = places[at].time
-            places[at] = within(rows, time - REACH, time + REACH) or places[at]
+        """Move each change to where the rows about it have it, which depend on where it was."""
+        left = list(range(len(places)))
+        for _ in range(_MOST_MOVES):
+            moved = []
+            for (at, _), rows in rows_about([(at, at) for at in left]):
+                time = places[at].time
+                places[at] = within(rows, time - REACH, time + REACH) or places[at]
+                if abs(places[at].time - time) > STEP / 2:
+                    moved.append(at)
+            left = moved
 
     while places and len(places) != count:
         count = len(places)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+import algid
 from algid.estimators.whitening import Linearised, covariance_factor
 from algid.log import Log
 from algid.model import Motion
@@ -114,7 +117,7 @@ def test_rows_that_err_alike_are_worth_as_much_less(alike: int) -> None:
     for _ in range(60):
         shared = np.repeat(rng.standard_normal((n // alike, 2)), alike, axis=0)
         step = 0.1 * (t > 1.5)[:, None]
-        rows = Rows(t, 1e-3, g, (shared + step).ravel(), linear)
+        rows = Rows(t, 1e-3, g, (shared + step).ravel(), np.zeros((2, 2, n)), linear)
         worths.append(place(rows, 1.5, 1.5, 1.0).gain)
     # a step of 0.1 amid 6,000 rows of variance one is worth 0.1² · 6000 / 4 squares,
     # and one chance more; where 200 rows are one, chance alone is three times its half a square
@@ -122,3 +125,22 @@ def test_rows_that_err_alike_are_worth_as_much_less(alike: int) -> None:
         assert np.median(worths) == pytest.approx(15, rel=0.3)
     else:
         assert np.median(worths) < 4
+
+
+def test_brackets_hold_the_time_of_a_heavy_payload_amid_noisy_angles() -> None:
+    noise: dict[str, Any] = {
+        "position_noise": 1e-3,
+        "torque_noise": 1e-2,
+        "rate": 200.0,
+        "torque": "wide",
+    }
+    arm = algid.identify(
+        *algid.synthesise("case1", duration=4.0, seed=3, **noise), model="plain", report=False
+    )
+    for seed, time in ((22, 2.274), (24, 2.548), (26, 2.822)):
+        schedule = [(time, 0.3)]
+        log = algid.synthesise(
+            "case1", duration=5.0, seed=seed, payload_schedule=schedule, **noise
+        )[0]
+        ((_, low, high),) = algid.track(log, arm).track.changes
+        assert low <= time <= high
