@@ -105,6 +105,8 @@ def turns(
         turn = np.zeros_like(motion.load)
         turn[:, joint] = -motion.load[:, joint]
         yield place[name], turn
+    if not np.any(compliance):  # a rigid joint turns its link by no other coefficient
+        return
     beside = {at: J[:, at] for at in set(range(len(model.names))).difference(inertial(model))}
     for share, whole in of_motors(model):
         of_rotor = J[:, whole] + (1 - c[share]) / c[whole] * J[:, share]
