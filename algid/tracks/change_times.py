@@ -92,11 +92,13 @@ class Rows:
     def steps(self, moments: FloatArray) -> FloatArray:
         """Columns (S, 2 n) of a kilogram that is grasped at each of `moments` (S,)."""
         h = step_response((self.t - moments[:, None]) / self.dt)
-        (a, b), (c, d) = (1 - h) * self.jump[:, :, None]
-        a, d = a + 1, d + 1
-        first, second = self.g
-        behind = np.stack([d * first - b * second, a * second - c * first], axis=1)
-        return self.whitened(behind * (h / (a * d - b * c))[:, None])
+        columns = self.g * h[:, None]
+        at, n = np.nonzero((h != 0) & (h != 1))  # where differences mix both accelerations
+        mixed, share = h[at, n], (1 - h[at, n]) * self.jump[:, :, n]
+        (a, b), (c, d) = share + np.eye(2)[:, :, None]
+        first, second = self.g[:, n] * mixed / (a * d - b * c)
+        columns[at, :, n] = np.transpose([d * first - b * second, a * second - c * first])
+        return self.whitened(columns)
 
 
 def step_response(u: FloatArray) -> FloatArray:
@@ -229,11 +231,12 @@ def confirmed(
     def shift() -> None:
         """Move each change to where the rows about it have it, which depend on where it was."""
         left = list(range(len(places)))
-        for _ in range(_MOST_MOVES):
+        for number in range(_MOST_MOVES):
             moved = []
             for (at, _), rows in rows_about([(at, at) for at in left]):
-                time = places[at].time
-                places[at] = within(rows, time - REACH, time + REACH) or places[at]
+                time, (low, high) = places[at].time, places[at].safe
+                reach = REACH if number == 0 else min(REACH, 2 * max(time - low, high - time))
+                places[at] = within(rows, time - reach, time + reach) or places[at]
                 if abs(places[at].time - time) > STEP / 2:
                     moved.append(at)
             left = moved
