@@ -106,9 +106,12 @@ def ros1_file(path: Path) -> MessageFile:
     from rosbags.rosbag1 import Reader
     from rosbags.typesys.msg import denormalize_msgtype
 
-    reader = Reader(path)
-    with as_log_error(path, "bag", f"rosbag reindex {path.name} may mend it, else copy it again"):
+    reader, mend = Reader(path), f"rosbag reindex {path.name} may mend it, else copy it again"
+    with as_log_error(path, "bag", mend):
         reader.open()
+        if not all(chunk.connection_counts for chunk in reader.chunk_infos):
+            reader.close()
+            raise LogError(f"{path}: the bag's index has a chunk without messages; {mend}")
     channels, counts = {}, Counter[int]()
     for one in reader.connections:
         definition = one.msgdef.data.encode()

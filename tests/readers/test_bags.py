@@ -172,6 +172,10 @@ def test_a_bag_without_its_index_is_refused_with_its_mend(tmp_path: Path) -> Non
     path.write_bytes(poked(content, content.index(b"index_pos=") + 10, "<Q", 0))
     with pytest.raises(LogError, match=rf"not indexed.*; {mend}"):
         read_log(path)
+    # how many topics the last chunk is said to have
+    path.write_bytes(poked(content, content.rindex(b"count=") + 6, "<I", 0))
+    with pytest.raises(LogError, match=rf"a chunk without messages; {mend}"):
+        read_log(path)
 
 
 def test_an_index_that_lists_fewer_messages_than_it_counts_is_told(tmp_path: Path) -> None:
