@@ -256,22 +256,31 @@ def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> Residual
     """
 
     def gather(window: float) -> tuple[list[ResidualSums], float]:
-        runs: list[list[FloatArray]] = []
+        gathered: list[ResidualSums] = []
+        rows: list[FloatArray] = []
         longest = spacing = 0.0
+
+        def add_up() -> None:
+            if _count(rows) >= 2 * OVERLAP:
+                together = np.concatenate(rows, axis=1)
+                gathered.append(residual_sums(together, spacing, OVERLAP, LAGS * OVERLAP // 2))
+            rows.clear()
+
         for piece, windows, own in residual_rows(source, settings, c, window):
-            longest, spacing = max(longest, _seconds(piece)), windows.step * windows.dt
-            if not (runs and piece.continues):
-                runs.append([])
-            runs[-1].append(own)
-        whole = [np.concatenate(run, axis=1) for run in runs]
-        lags = LAGS * OVERLAP // 2
-        return [
-            residual_sums(rows, spacing, OVERLAP, lags)
-            for rows in whole
-            if rows.shape[1] >= 2 * OVERLAP
-        ], longest
+            longest = max(longest, _seconds(piece))
+            if not piece.continues or _count(rows) >= PIECE_SAMPLES:  # no log is held whole
+                add_up()
+            spacing = windows.step * windows.dt
+            rows.append(own)
+        add_up()
+        return gathered, longest
 
     return pooled(_with_window(gather, settings.window))
+
+
+def _count(rows: Iterable[FloatArray]) -> int:
+    """How many windows the parts (4, R) have together."""
+    return sum(part.shape[1] for part in rows)
 
 
 def _with_window(gather: Callable[[float], tuple[Gathered, float]], window: float) -> Gathered:
