@@ -10,9 +10,9 @@ algebra. From no term on, the one whose evidence outweighs its price most is add
 with W what its n coefficients explain of the squares, s² the mean square that all terms leave (1 at
 least), T the terms to choose from and α the level at which the likelihood is refuted, so that what
 refutes it is chosen where it is a term; then those are dropped that are not worth it beside the
-others. A rotor is an exception, as every geared
-motor has one and k1, k3 and k5 take it up: it stays from W / s² > 3.84 on if they would move by
-more than two of the deviations that they had without it.
+others. A rotor is an exception, as every geared motor has one and k1, k3 and k5 take it up: it
+stays from W / s² > 3.84 on if they would move by more than two of the deviations that they had
+without it.
 
 ======  ==================================================================  ====================
 symbol  name                                                                shape

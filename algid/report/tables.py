@@ -120,9 +120,9 @@ def terms_table(fit: FitSummary | None) -> Table:
         rows.append((term.term, *cells, yes_or_no(term.kept), term.why))
     return Table(
         "Terms tried",
-        "Term | Change of BIC | Log odds | Kept | Why",
+        "Term | Change of BIC | Beyond chance | Kept | Why",
         rows,
-        "A negative change of BIC and positive log odds favour the term.",
+        "A negative change of BIC, and what is explained beyond chance, favour the term.",
     )
 
 

@@ -119,10 +119,11 @@ class WhitenessTest(_Model):
 
 
 class TermCriterion(_Model):
-    """Worth of an optional term of the model: change of the criterion, negative is better.
+    """Worth of an optional term of the model.
 
-    Where the terms were chosen automatically, `evidence` is the log of the odds for the term, and
-    `why` says what decided.
+    `delta_bic` is the change of the Bayesian criterion, negative is better. Where the terms were
+    chosen automatically, `evidence` is half of what the term explains of the squares less half of
+    what chance does, positive is better, and `why` says what decided.
     """
 
     term: str

@@ -68,27 +68,12 @@ def track_log(
     profile: Profile | None = None,
     settings: Mapping[str, Any] | None = None,
 ) -> TrackResult:
-    """Find when the payload changed during a log and what each stretch weighs.
-
-    Parameters
-    ----------
-    log : path or `Log`
-    parameters : Result or path of one
-        The arm.
-    l1, l2 : float, m
-        Link lengths; the result's by default.
-    profile : Profile
-        What the log's names, units and signs mean; where it is silent, what was said of the
-        result's logs.
-    settings : mapping
-        What else the result should hold of the call.
+    """The track of a log by an arm: see `algid.track`; `settings` are what else it should hold.
 
     Raises
     ------
     LogError
         If the log cannot be used or is too short.
-    ResultError
-        If the result cannot be read, or leaves a constant or a link length open.
     """
     if isinstance(parameters, Result):
         result, content, called = parameters, result_json(parameters).encode(), parameters.log.path
