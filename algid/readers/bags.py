@@ -6,13 +6,13 @@ rosbags passes over the rows of a `-wal` file beside a database: SQLite itself r
 from __future__ import annotations
 
 import re
-import sqlite3
 import weakref
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from functools import cache, partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,30 +26,31 @@ from algid.readers.mcap import mcap_file
 from algid.readers.messages.message_file import MessageChannel, MessageFile, Messages
 from algid.readers.messages.offer import MessageLog
 
+if TYPE_CHECKING:
+    import sqlite3
+
 _BATCH_BYTES, _BATCH_ROWS = 1 << 21, 1 << 14
 _NAME_AND_NUMBER = re.compile(r"(.*?)(?:_(\d+))?$")
 
 
-def open_bag(path: Path, kind: str) -> MessageLog:
-    """A ROS 1 bag ("bag"), a SQLite file of rosbag2 ("db3"), or a folder ("rosbag2").
+def open_messages(path: Path, kind: str) -> MessageLog:
+    """An MCAP file ("mcap"), a ROS 1 bag ("bag"), a file ("db3") or folder ("rosbag2") of rosbag2.
 
     Raises
     ------
     LogError
         If none of a folder's files is there, or its metadata cannot be read.
     """
+    paths, kinds = [path], [kind]
     notices: tuple[Notice, ...] = ()
-    files: list[Callable[[], MessageFile]] = [
-        partial(ros1_file if kind == "bag" else database_file, path)
-    ]
-    if kind == "rosbag2":
+    if kind == "rosbag2":  # which may mix them
         paths, notices = _files_of_folder(path)
-        files = [
-            partial(mcap_file if one.suffix == ".mcap" else database_file, one) for one in paths
-        ]
-        kind = "mcap" if paths[0].suffix == ".mcap" else kind
-    form = "mcap" if kind == "mcap" else "bag"
-    return MessageLog(str(path), form, [cache(one) for one in files], notices)
+        kinds = [one.suffix[1:] for one in paths]
+    readers = {"mcap": mcap_file, "bag": ros1_file}
+    files = []
+    for one, own in zip(paths, kinds, strict=True):
+        files.append(cache(partial(readers.get(own, database_file), one)))
+    return MessageLog(str(path), "mcap" if kinds[0] == "mcap" else "bag", files, notices)
 
 
 def _files_of_folder(folder: Path) -> tuple[list[Path], tuple[Notice, ...]]:
@@ -180,6 +181,8 @@ def database_file(path: Path) -> MessageFile:
 @contextmanager
 def _connected(path: Path) -> Iterator[sqlite3.Connection]:
     """A connection that writes nothing, not even beside the file where nothing is unfinished."""
+    import sqlite3
+
     beside = [path.with_name(f"{path.name}{suffix}") for suffix in ("-wal", "-journal")]
     unfinished = any(one.exists() and one.stat().st_size for one in beside)
     place = f"{path.absolute().as_uri()}?{'mode=ro' if unfinished else 'immutable=1'}"

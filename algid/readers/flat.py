@@ -24,6 +24,7 @@ from algid.base.quantiles import median
 from algid.base.units import ANGLE, NANOSECONDS, unit_of
 from algid.log import IntArray, Origin, Reading, add, word_sum
 from algid.notices import Notice, Remedy
+from algid.readers.annotations import lines_of, settings_unused, stated_rate, unused
 from algid.readers.column_names import (
     COMMANDED,
     CURRENTS,
@@ -37,7 +38,6 @@ from algid.readers.column_names import (
 from algid.readers.convert import channel_readings, laws_of
 from algid.readers.joints import LOOKED, moving_joints, reading_of
 from algid.readers.log_reader import TableReader
-from algid.readers.stated import lines_of, settings_unused, stated_rate, unused
 from algid.readers.table import (
     JOINT_CHANNELS,
     REFERENCES,

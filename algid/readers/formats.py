@@ -96,14 +96,10 @@ def open_file(path: Path, profile: Profile) -> TableFile | MessageLog:
     """
     kind = format_of(path).name
     match kind:
-        case "mcap":
-            from algid.readers.mcap import open_mcap
+        case "mcap" | "rosbag2" | "db3" | "bag":
+            from algid.readers.bags import open_messages
 
-            return open_mcap(path)
-        case "rosbag2" | "db3" | "bag":
-            from algid.readers.bags import open_bag
-
-            return open_bag(path, kind)
+            return open_messages(path, kind)
         case "parquet" | "feather":
             from algid.readers.arrow_files import open_feather, open_parquet
 

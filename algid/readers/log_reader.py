@@ -16,9 +16,9 @@ from algid.base.limits import LIMITS
 from algid.base.text import counted
 from algid.log import IntArray, Log, Origin
 from algid.notices import Notice, Remedy
+from algid.readers.annotations import other_rate
 from algid.readers.clock import in_order
 from algid.readers.convert import Law, convert
-from algid.readers.stated import other_rate
 from algid.readers.table import BLOCK_ROWS, REFERENCES, ROWS, SampleTable, cut
 
 QUANTITIES = ("theta", "tau", "omega", "q_des")

@@ -7,14 +7,11 @@ is searched for: `mcap recover` does that.
 from __future__ import annotations
 
 import io
-import math
 import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cache, partial, reduce
-from operator import or_
 from pathlib import Path
 from typing import IO, Any
 
@@ -27,31 +24,19 @@ from mcap.records import Channel, Chunk, Metadata, MetadataIndex, Schema, Statis
 from mcap.writer import MCAP0_MAGIC as MCAP
 from numpy.typing import NDArray
 
-from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.runtime import ahead
-from algid.base.text import counted
 from algid.log import KEY, IntArray, loads
 from algid.notices import Notice
 from algid.readers.flat import as_log_error
-from algid.readers.messages.message_file import (
-    MessageChannel,
-    MessageFile,
-    Messages,
-    gather,
-)
-from algid.readers.messages.offer import MessageLog
+from algid.readers.messages.message_file import MessageChannel, MessageFile, Messages, gather
 
 _FRAME = struct.Struct("<BQ")
-_INDEX = struct.Struct("<BQHI")
+_INDEX = struct.Struct("<BQH4x")
 """Head of a message index: code, length, channel, bytes of its entries (16 each)."""
-_FOOTER_BYTES = 37
-"""Of a footer with the magic behind it; its checksum covers the summary and the first 25."""
-_HEAD_BYTES = 31
-"""Of a message record before its payload: code, length, channel, sequence, two times."""
-_HEAD = np.dtype(
-    [("code", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_ns", "<i8")]
-)
+_HEAD = np.dtype("u1, <u8, <u2, <u4, <i8, <i8")
+"""Of a message before its payload: code, length, channel, sequence, log time, publish time."""
+_MESSAGE_BYTES = _HEAD.itemsize - _FRAME.size
 _KINDS: dict[int, tuple[Any, str]] = {
     Opcode.SCHEMA: (Schema, "id"),
     Opcode.CHANNEL: (Channel, "id"),
@@ -60,26 +45,20 @@ _KINDS: dict[int, tuple[Any, str]] = {
     Opcode.STATISTICS: (Statistics, ""),
 }
 """Records that define something, and what they are known by."""
+_TRUTH = (Opcode.METADATA, KEY), (Opcode.METADATA_INDEX, KEY)
 _LOOSE_BYTES = 1 << 23
 """Of records outside of chunks that are read at once."""
 _BUFFER_BYTES = 1 << 9
 """What is read of a chunk to know its head."""
 Definitions = list[tuple[int, bytes]]
 """Code and content of each."""
-Listed = tuple[IntArray, Definitions, int]
-"""Offsets of messages, definitions, and where the last whole record ends."""
-
-
-def open_mcap(path: Path) -> MessageLog:
-    """An MCAP log."""
-    return MessageLog(str(path), "mcap", [cache(partial(mcap_file, path))])
 
 
 @dataclass
 class _Part:
     """Where records lie: a chunk with the message indexes behind it, or `loose` ones.
 
-    `counts` are its messages by channel, as the indexes tell; None where nobody knows.
+    `counts` are its messages by channel; None where nobody knows.
     """
 
     start: int
@@ -96,36 +75,42 @@ class _Contents:
     parts: list[_Part] = field(default_factory=list)
     notices: list[Notice] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
-    redefined: float = math.inf
+    redefined: float = np.inf
     """From which byte on a channel or schema is another than before: messages there are not read,
     since nobody knows which definition they follow."""
 
     def define(self, others: Definitions, place: int) -> None:
-        """Take in the records of a part at a byte: the first one of an id holds."""
+        """Take in the records of a part at a byte: the first one of an id holds.
+
+        Raises
+        ------
+        ValueError
+            If a channel or schema is another than before.
+        """
         for code, content in others:
             kind, name = _KINDS[code]
-            one = _parsed(kind, content)
+            one = kind.read(ReadDataStream(io.BytesIO(content)))
             known = self.records.setdefault((code, getattr(one, name, None)), one)
             if known != one and name == "id":
                 self.redefined = min(place, self.redefined)
+        if place >= self.redefined:
+            raise ValueError("a channel or its schema is defined anew and differently")
 
-    def look(self, stream: IO[bytes], *, loose: bool) -> None:
-        """Unpack parts to know what they define and hold; damage is told when they are read."""
-        for part in self.parts:
-            if part.loose == loose:
-                try:
-                    _, numbers, others = _records(stream, part)
-                    self.define(others, part.start)
-                    part.counts = Counter(numbers.tolist())
-                except Exception as error:  # what the libraries raise
-                    self.damage.append(f"{error} (at byte {part.start})")
+    def read(self, stream: IO[bytes], part: _Part, channels: frozenset[int]) -> Messages | str:
+        """The messages of some channels in a part, or why it is lost.
 
-    def counts(self) -> Counter[int]:
-        """Messages by channel, as far as the parts are known."""
-        total = Counter[int]()
-        for part in self.parts:
-            total.update(part.counts or {})
-        return total
+        What it defines is taken in; of no channels, what it holds is counted.
+        """
+        try:
+            messages, numbers, others = _records(stream, part)
+            self.define(others, part.start)
+        except Exception as error:  # what the libraries raise of damaged bytes
+            return f"{error or 'it breaks off'} (at byte {part.start})"
+        if not channels:
+            part.counts = Counter(numbers.tolist())
+        chosen = np.zeros(1 << 16, np.bool_)  # numpy.isin takes longer than all else here
+        chosen[list(channels)] = True
+        return messages.take(np.flatnonzero(chosen[numbers]))
 
 
 def mcap_file(path: Path) -> MessageFile:
@@ -136,46 +121,56 @@ def mcap_file(path: Path) -> MessageFile:
     LogError
         If the truth in its metadata cannot be read.
     """
-    found, why, span = _Contents(), "", None
+    found, counts, promised, why = _Contents(), Counter[int](), Counter[int](), ""
     with path.open("rb", buffering=_BUFFER_BYTES) as stream:
         size = stream.seek(0, io.SEEK_END)
-        _walk(stream, size, found)
+        data_end = _walk(stream, size, found)
         try:
-            found.define(_summary(stream, size), 0)
+            found.define(_summary(stream, data_end, size), 0)
         except Exception as error:  # what the package raises of bytes that are no records
             why = str(error)
             found.records.clear()
-        found.look(stream, loose=True)
-        promised, records = Counter[int](), found.records
-        statistics = records.get((Opcode.STATISTICS, None))
+        statistics = found.records.get((Opcode.STATISTICS, None))
         if statistics:
-            promised += Counter(statistics.channel_message_counts)
-            span = statistics.message_start_time, statistics.message_end_time
-            if any((Opcode.CHANNEL, number) not in records for number in promised):
-                why = "it counts messages of channels that it does not define"
-        if why or not statistics or all(part.loose for part in found.parts):
+            promised.update(statistics.channel_message_counts)
+            if any((Opcode.CHANNEL, number) not in found.records for number in promised):
+                statistics, why = None, "it counts messages of channels that it does not define"
+        if why:
+            found.damage.append(f"its summary: {why}")
+        if not statistics or all(part.loose for part in found.parts):
             numbers = {"case": "summary" if why else "none", "why": why}
-            found.notices.insert(0, Notice("DAMAGED_INDEX", numbers=numbers))
-            found.damage[:0] = [f"its summary: {why}"] if why else []
-            found.look(stream, loose=False)
-    metadata = records.get((Opcode.METADATA, KEY))
-    if metadata is None and (Opcode.METADATA_INDEX, KEY) in records:  # no checksum covers it
-        raise LogError(f"{path}: the truth in the MCAP file is damaged (no name); copy it again")
-    with as_log_error(path, "truth in the MCAP"):
-        truth = loads(metadata.metadata.get(KEY, "")).truth if metadata else None
+            found.notices.append(Notice("DAMAGED_INDEX", numbers=numbers))
+        for part in found.parts:
+            if part.loose or not statistics:
+                lost = found.read(stream, part, frozenset())
+                found.damage += [lost] if isinstance(lost, str) else []
+            counts.update(part.counts or {})
+    truth = None
+    if not found.records.keys().isdisjoint(_TRUTH):  # of its name no checksum speaks
+        with as_log_error(path, "truth in the MCAP"):
+            truth = loads(found.records[_TRUTH[0]].metadata[KEY]).truth
     channels = {}
-    for (code, number), one in records.items():
+    for (code, number), one in found.records.items():
         if code == Opcode.CHANNEL:
-            schema = records.get((Opcode.SCHEMA, one.schema_id)) or Schema(0, b"", "", "")
-            form = (one.message_encoding, schema.encoding, schema.data)
-            channels[number] = MessageChannel(one.topic, schema.name, *form, one.metadata)
-    counts = found.counts() | promised  # what is not there is lost
-    batches, notices = partial(_batches, path, found), tuple(found.notices)
-    return MessageFile(str(path), channels, batches, counts, span, notices, found.damage, truth)
-
-
-def _parsed(kind: Any, content: bytes) -> Any:
-    return kind.read(ReadDataStream(io.BytesIO(content)))
+            schema = found.records.get((Opcode.SCHEMA, one.schema_id)) or Schema(0, b"", "", "")
+            channels[number] = MessageChannel(
+                one.topic,
+                schema.name,
+                one.message_encoding,
+                schema.encoding,
+                schema.data,
+                one.metadata,
+            )
+    return MessageFile(
+        str(path),
+        channels,
+        lambda channels: ahead(_batches(path, found, channels)),
+        counts | promised,  # what is not there is lost
+        statistics and (statistics.message_start_time, statistics.message_end_time),
+        tuple(found.notices),
+        found.damage,
+        truth,
+    )
 
 
 def _read(stream: IO[bytes], start: int, length: int) -> bytes:
@@ -186,67 +181,55 @@ def _read(stream: IO[bytes], start: int, length: int) -> bytes:
     return content
 
 
-def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
-    """Find the parts of a file up to its end, or to its first break."""
-    place, data_end = len(MCAP), 0
-    while True:
+def _walk(stream: IO[bytes], size: int, found: _Contents) -> int:
+    """Find the parts of a file up to its end, or to its first break; 0, or where its data end."""
+    place, last, data_end, code = len(MCAP), _Part(0, 0, loose=False), 0, 0
+    while code != Opcode.FOOTER:
         head = _read(stream, place, min(_INDEX.size, size - place))
-        code, length, channel, entries = _INDEX.unpack(head.ljust(_INDEX.size, b"\0"))
+        code, length, channel = _INDEX.unpack(head.ljust(_INDEX.size, b"\0"))
         end = place + _FRAME.size + length
-        known = 0 < code <= Opcode.DATA_END or code >= 0x80
-        known &= code != Opcode.MESSAGE or length >= _HEAD_BYTES - 9
-        if not known or end > size:
+        if not code or end > size or (code == Opcode.MESSAGE and length < _MESSAGE_BYTES):
             break
-        last = found.parts[-1] if found.parts else _Part(0, 0, loose=False)
         follows, loose = last.start + last.length == place, code != Opcode.CHUNK
         if code == Opcode.MESSAGE_INDEX and follows and not last.loose:
-            last.length += end - place
-            if 0 < entries == length - 6:
-                last.counts = {} if last.counts is None else last.counts
-                last.counts[channel] = entries // 16
+            last.length = end - last.start
+            if length > _INDEX.size - _FRAME.size:
+                last.counts = {**(last.counts or {}), channel: length // 16}
         elif code in (Opcode.CHUNK, Opcode.MESSAGE) or (code in _KINDS and not data_end):
+            data_end = 0  # it stood too early
             if loose and follows and last.loose and last.length < _LOOSE_BYTES:
-                last.length += end - place
+                last.length = end - last.start
             else:
-                found.parts.append(_Part(place, end - place, loose))
-        elif code == Opcode.DATA_END:
-            data_end = end
-        place = end
-        if code == Opcode.FOOTER:
-            break
-    left, torn = size - place, place < end and (known or len(head) < _FRAME.size)
-    if data_end and (left <= len(MCAP) or torn):
-        return  # what breaks off behind the data is its summary
-    if torn:
-        case = "chunk" if code == Opcode.CHUNK else "record"
-        numbers: dict[str, Any] = {"case": case if left else "end", "bytes": left}
-        found.notices.append(Notice("CUT_OFF", numbers=numbers))
-    else:
-        numbers = {"case": "bytes", "bytes": left, "first": place}
-        numbers["why"] = "what stands there is no record"
-        found.notices.append(Notice("DAMAGED", numbers=numbers))
-    if left:
-        found.damage.append(f"it breaks off at byte {place}")
-        if known and code == Opcode.CHUNK:
-            found.parts.append(_Part(place, left, loose=False))
+                last = _Part(place, end - place, loose)
+                found.parts.append(last)
+        place, data_end = end, end if code == Opcode.DATA_END else data_end
+    left = size - place
+    if data_end and (place < end or left <= len(MCAP)):
+        return data_end  # what breaks off behind the data is its summary
+    case = "chunk" if code == Opcode.CHUNK else "record" if left else "end"
+    found.notices.append(Notice("CUT_OFF", numbers={"case": case, "first": place, "bytes": left}))
+    found.damage.append(f"it breaks off at byte {place}")
+    if case == "chunk":
+        found.parts.append(_Part(place, left, loose=False))
+    return 0
 
 
-def _summary(stream: IO[bytes], size: int) -> Definitions:
-    """Code and content of what a file's summary defines: nothing where it has none.
+def _summary(stream: IO[bytes], start: int, size: int) -> Definitions:
+    """Code and content of what is defined behind the data, whose checksum covers the footer too.
 
     Raises
     ------
     ValueError
         If it is damaged.
     """
-    tail = _read(stream, size - _FOOTER_BYTES, _FOOTER_BYTES)
-    if not tail.endswith(MCAP):
+    content = _read(stream, start, size - start) if start else b""
+    if not content.endswith(MCAP):
         raise ValueError("the file has no end: it was cut off")
-    start, checksum = struct.unpack_from("<Q8xI", tail, _FRAME.size)
-    content = _read(stream, start, size - _FOOTER_BYTES - start) if start else b""
-    if checksum and zlib.crc32(tail[:25], zlib.crc32(content)) != checksum:
+    if (checksum := content[-12:-8]) != bytes(4) and zlib.crc32(content[:-12]) != int.from_bytes(
+        checksum, "little"
+    ):
         raise ValueError("its checksum is wrong")
-    return _one_by_one(content, 0, len(content))[1]
+    return _listed(content)[1]
 
 
 def _records(stream: IO[bytes], part: _Part) -> tuple[Messages, NDArray[np.uint16], Definitions]:
@@ -257,29 +240,27 @@ def _records(stream: IO[bytes], part: _Part) -> tuple[Messages, NDArray[np.uint1
     ValueError
         If it is damaged; the libraries raise more.
     """
-    content, checked, torn = _read(stream, part.start, part.length), False, False
-    listed: Listed | None = None
+    content, index = _read(stream, part.start, part.length), b""
+    checked = torn = False
     if not part.loose:
         end = _FRAME.size + _FRAME.unpack_from(content)[1]
         torn, index = end > len(content), content[end:]
-        chunk = _parsed(Chunk, content[_FRAME.size : end])
+        chunk = Chunk.read(ReadDataStream(io.BytesIO(content[_FRAME.size : end])))
         content, checked = _unpacked(chunk), chunk.uncompressed_crc != 0
-        wrong = not torn
-        if len(content) == chunk.uncompressed_size:
-            wrong = checked and zlib.crc32(content) != chunk.uncompressed_crc
-        if wrong:
+        left = chunk.uncompressed_size - len(content)
+        wrong = checked and zlib.crc32(content) != chunk.uncompressed_crc
+        if left < 0 or (wrong if left == 0 else not torn):
             raise ValueError("a chunk's size or its checksum is wrong")
-        listed = _by_index(content, index)
     octets: NDArray[np.uint8] = np.frombuffer(content, np.uint8)
-    offsets, others, end = listed or _one_by_one(content, 0, len(content))
+    offsets, others, end = _listed(content, index)
     if end != len(content) and not torn:
         raise ValueError("its records do not fill it")
     heads = gather(octets, offsets, f"V{_HEAD.itemsize}").view(_HEAD)
-    sizes = heads["length"].astype(np.int64) - (_HEAD_BYTES - 9)
-    log_ns = heads["log_ns"].astype(np.int64)
+    sizes = heads["f1"].astype(np.int64) - _MESSAGE_BYTES
+    log_ns = heads["f4"].astype(np.int64)
     # nothing vouches for what is there of a torn chunk, which CUT_OFF says
-    messages = Messages(octets[:end], offsets + _HEAD_BYTES, sizes, log_ns, checked or torn)
-    return messages, heads["channel"], others
+    messages = Messages(octets[:end], offsets + _HEAD.itemsize, sizes, log_ns, checked or torn)
+    return messages, heads["f2"], others
 
 
 def _unpacked(chunk: Chunk) -> bytes:
@@ -290,90 +271,60 @@ def _unpacked(chunk: Chunk) -> bytes:
     ValueError
         If it claims more memory than a recorder's chunk needs, or its packing is not known.
     """
-    size = chunk.uncompressed_size
-    if size > LIMITS.chunk_bytes:
+    size, packed = chunk.uncompressed_size, chunk.compression
+    if size > LIMITS.chunk_bytes or packed not in ("", "lz4", "zstd"):
         raise ValueError(
-            f"a chunk claims {counted(size, 'byte')} unpacked, more than {LIMITS.chunk_bytes:,}"
+            f"a chunk of {size:,} bytes, packed with {packed!r}; expected at most "
+            f"{LIMITS.chunk_bytes:,}, packed with lz4, zstd or not"
         )
-    if chunk.compression == "zstd":
-        with zstandard.ZstdDecompressor().stream_reader(chunk.data) as unpacker:
-            return unpacker.read(size + 1)
-    if chunk.compression == "lz4":
+    if packed == "zstd":
+        return zstandard.ZstdDecompressor().stream_reader(chunk.data).read(size + 1)
+    if packed == "lz4":
         return bytes(lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1))
-    if chunk.compression:
-        raise ValueError(f"a chunk is packed with {chunk.compression!r}; expected zstd or lz4")
     return chunk.data[: size + 1]
 
 
-def _one_by_one(content: bytes, place: int, stop: int) -> Listed:
-    """The whole records in [place, stop), found by their lengths.
+def _listed(content: bytes, index: bytes = b"") -> tuple[IntArray, Definitions, int]:
+    """Offsets of the messages, the definitions, and where the last whole record ends.
 
-    Raises
-    ------
-    ValueError
-        If a message is shorter than its head.
+    Records are found by their lengths; from the first message on by the message indexes behind a
+    chunk, if what they list fills it: they have no checksum of their own.
     """
-    offsets, others = list[int](), Definitions()
-    unpack = _FRAME.unpack_from
-    while place + 9 <= stop:
-        code, length = unpack(content, place)
-        end = place + 9 + length
-        if end > stop:
+    offsets, others, place, size = list[int](), Definitions(), 0, len(content)
+    while place + _FRAME.size <= size:
+        code, length = _FRAME.unpack_from(content, place)
+        end = place + _FRAME.size + length
+        if end > size or (code == Opcode.MESSAGE and length < _MESSAGE_BYTES):
             break
+        if code == Opcode.MESSAGE and index:
+            listed, index = np.append(_indexed(index), size), b""
+            steps = np.diff(listed)
+            if listed[0] == place and steps.min() >= _HEAD.itemsize:
+                octets: NDArray[np.uint8] = np.frombuffer(content, np.uint8)
+                heads = gather(octets, listed[:-1], f"V{_FRAME.size}").view("u1, <i8")
+                if np.all((heads["f0"] == code) & (heads["f1"] == steps - _FRAME.size)):
+                    return listed[:-1], others, size
         if code == Opcode.MESSAGE:
-            if length < _HEAD_BYTES - 9:
-                raise ValueError("a message is shorter than its head")
             offsets.append(place)
         elif code in _KINDS:
-            others.append((code, content[place + 9 : end]))
+            others.append((code, content[place + _FRAME.size : end]))
         place = end
     return np.array(offsets, np.int64), others, place
 
 
-def _by_index(content: bytes, index: bytes) -> Listed | None:
-    """The same by the message indexes behind a chunk.
-
-    None where the messages that they list do not fill the chunk behind its first definitions: an
-    index has no checksum of its own.
-    """
-    octets: NDArray[np.uint8] = np.frombuffer(content, np.uint8)
+def _indexed(index: bytes) -> IntArray:
+    """The offsets of messages that message indexes list, in their order in the chunk."""
     found, place = [np.empty(0, np.int64)], 0
     while place < len(index):
-        _, length, _, entries = _INDEX.unpack_from(index, place)
-        if entries != length - 6:
-            return None
-        found.append(np.frombuffer(index, "<i8", entries // 16 * 2, place + _INDEX.size)[1::2])
-        place += _FRAME.size + length
-    offsets = np.sort(np.concatenate(found))
-    if not offsets.size or offsets[0] < 0 or offsets[-1] > octets.size - _HEAD_BYTES:
-        return None
-    heads = gather(octets, offsets, f"V{_HEAD.itemsize}").view(_HEAD)
-    lengths = heads["length"].astype(np.int64)
-    gaps = np.diff(offsets, append=octets.size) - 9 != lengths
-    if np.any(gaps | (heads["code"] != Opcode.MESSAGE)):
-        return None
-    unlisted, others, first = _one_by_one(content, 0, int(offsets[0]))
-    return (offsets, others, octets.size) if first == offsets[0] and not unlisted.size else None
+        entries = (_FRAME.unpack_from(index, place)[1] - 6) // 16
+        found.append(np.frombuffer(index, "<i8", 2 * entries, place + _INDEX.size)[1::2])
+        place += _INDEX.size + 16 * entries
+    return np.sort(np.concatenate(found))
 
 
 def _batches(path: Path, found: _Contents, channels: frozenset[int]) -> Iterator[Messages | str]:
     """The messages of `channels` in file order; or why a part of them is lost."""
-
-    def batches() -> Iterator[Messages | str]:
-        with path.open("rb", buffering=_BUFFER_BYTES) as stream:
-            for part in found.parts:
-                if part.counts is not None and not part.counts.keys() & channels:
-                    continue
-                try:
-                    messages, numbers, others = _records(stream, part)
-                    found.define(others, part.start)
-                    if part.start >= found.redefined:
-                        raise ValueError("a channel or its schema is defined anew and differently")
-                except Exception as error:  # what the libraries raise of damaged bytes
-                    yield f"{error or 'it breaks off'} (at byte {part.start})"
-                    continue
-                # numpy.isin takes longer than all else here
-                ours = reduce(or_, [numbers == one for one in channels])
-                yield messages.take(np.flatnonzero(ours))
-
-    return ahead(batches())
+    with path.open("rb", buffering=_BUFFER_BYTES) as stream:
+        for part in found.parts:
+            if part.counts is None or not channels.isdisjoint(part.counts):
+                yield found.read(stream, part, channels)

@@ -22,8 +22,8 @@ from algid.base.limits import LIMITS
 from algid.base.text import repeated
 from algid.log import Companion
 from algid.notices import Notice
+from algid.readers.annotations import BAD, GOOD, GROUPS, several, units_in
 from algid.readers.column_names import STEMS
-from algid.readers.stated import BAD, GOOD, GROUPS, several, units_in
 
 if TYPE_CHECKING:
     import pyarrow as pa

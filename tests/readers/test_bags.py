@@ -17,7 +17,7 @@ from algid.base.errors import LogError
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.readers.bags import open_bag
+from algid.readers.bags import open_messages
 from tests.readers.large import write_db3
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.ways import STORES, Message, States, bag1, sent, written
@@ -49,7 +49,7 @@ def described(folder: Path, names: list[str], more: str = "") -> Path:
 
 
 def counts(folder: Path) -> list[list[int]]:
-    return [list(one().counts.values()) for one in open_bag(folder, "rosbag2").files]
+    return [list(one().counts.values()) for one in open_messages(folder, "rosbag2").files]
 
 
 def test_the_files_of_a_bag_come_as_its_metadata_list_them(tmp_path: Path) -> None:
@@ -58,7 +58,7 @@ def test_the_files_of_a_bag_come_as_its_metadata_list_them(tmp_path: Path) -> No
     for number in (0, 1, 2):
         write_db3(folder / f"bag_{number}.db3", 10 * (1 + number))
     assert counts(folder) == [[20], [10], [30]]
-    (lost,) = open_bag(folder, "rosbag2").notices
+    (lost,) = open_messages(folder, "rosbag2").notices
     assert (lost.code, lost.lossy) == ("DAMAGED", True)
     assert lost.text == "1 of 4 files of the bag missing: bag_10.db3"
 

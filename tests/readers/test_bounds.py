@@ -22,8 +22,8 @@ import pytest
 from algid.base.errors import LogError
 from algid.identification.identify import identify
 from algid.readers import read_log
+from algid.readers.annotations import units_in
 from algid.readers.column_names import Name, take_apart
-from algid.readers.stated import units_in
 from algid.writers import write_log
 from pipelines.mutations import clean_log
 from tests.conftest import Limited

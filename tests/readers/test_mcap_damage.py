@@ -179,7 +179,7 @@ def test_two_files_behind_one_another_are_not_one(tmp_path: Path) -> None:
     path.write_bytes(whole + whole)
     found = read_log(path)
     assert same(found, LOG)
-    assert f"from byte {len(whole) - 8} on" in lost(found)["DAMAGED"]
+    assert f"at byte {len(whole) - 8}: {len(whole) + 8:,} bytes" in lost(found)["CUT_OFF"]
 
 
 @pytest.mark.parametrize("tail", [b"", b"\x89MCAP0\r\n"])
@@ -201,7 +201,7 @@ def test_an_end_of_the_data_that_stands_too_early_hides_no_loss(
     assert len(beginning(path, whole)) == len(LONG)
     found = beginning(path, poked(whole, place + len(end) + 1, "<Q", 3))
     assert len(found) < len(LONG)
-    assert lost(found).keys() & {"DAMAGED", "CUT_OFF"}
+    assert lost(found)
 
 
 def test_what_the_statistics_promise_and_a_walk_does_not_find_is_told(tmp_path: Path) -> None:
@@ -265,12 +265,8 @@ def test_a_file_is_read_up_to_its_first_broken_record(
     found = beginning(path, poked(content, place + 1, "<Q", length))
     # a chunk that claims more bytes than the file has is torn, and whole
     assert 960 < len(found) < 1040
-    told = lost(found)
-    assert told.keys() & {"DAMAGED", "CUT_OFF"}
-    assert any(
-        str(number) in "".join(told.values()).replace(",", "")
-        for number in (place, len(content) - place)
-    ) or length in (0, 3)
+    told = lost(found)["CUT_OFF"].replace(",", "")
+    assert f" {place}:" in told or f" {len(content) - place} " in told or length in (0, 3)
 
 
 @pytest.mark.parametrize("statistics", [True, False])

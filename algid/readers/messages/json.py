@@ -12,9 +12,9 @@ from typing import Any
 
 from algid.base.limits import LIMITS
 from algid.base.text import repeated
+from algid.readers.annotations import BAD, GOOD, GROUPS
 from algid.readers.messages.layout import MessageLayout, MisfitError, Numbers
 from algid.readers.messages.message_file import Messages
-from algid.readers.stated import BAD, GOOD, GROUPS
 
 
 class JsonRecords:

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from algid.base.blocks import concatenated, rows_of
 from algid.base.limits import LIMITS
 from algid.base.text import counted
+from algid.readers.annotations import BAD, GOOD, GROUPS
 from algid.readers.messages.message_file import Messages, gather
-from algid.readers.stated import BAD, GOOD, GROUPS
 
 _BRACKET = re.compile(r"(\[[^\]]*\])")
 _ELEMENT = re.compile(r"(.*)\[(\d{1,9})\]")

@@ -12,12 +12,12 @@ from algid.base.limits import LIMITS
 from algid.base.text import repeated
 from algid.notices import Notice, Remedy
 from algid.profile import Profile
+from algid.readers.annotations import in_json_schema, lines_of, units_in
 from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.column_names import STEMS, ChannelChoice, choose
 from algid.readers.messages.layout import MessageLayout, MisfitError
 from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import codec_for, topic_tables
-from algid.readers.stated import in_json_schema, lines_of, units_in
 from algid.readers.table import (
     REFERENCES,
     ROWS,

@@ -16,8 +16,8 @@ from typing import Any
 
 from algid.base.limits import LIMITS
 from algid.base.text import counted
+from algid.readers.annotations import GROUPS
 from algid.readers.messages.layout import MessageLayout, MisfitError, Numbers
-from algid.readers.stated import GROUPS
 
 PRIMITIVES = {
     "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1",

@@ -11,12 +11,12 @@ import numpy as np
 
 from algid.base.errors import LogError
 from algid.notices import Notice, Remedy
+from algid.readers.annotations import several
 from algid.readers.flat import to_nanoseconds
 from algid.readers.messages import protobuf, ros
 from algid.readers.messages.json import JsonRecords
 from algid.readers.messages.layout import Codec, Decoder, MisfitError
 from algid.readers.messages.message_file import MessageChannel, MessageFile
-from algid.readers.stated import several
 from algid.readers.table import SampleTable, stack
 
 _STAMP = ("sec", "nanosec")
