@@ -1,105 +1,149 @@
 """How many small changes of the code the tests see: `make mutants`.
 
-mutmut changes one operator, number or argument at a time in the rooms whose numbers are believed,
-and runs tests that touch the changed function: those of its module, then of its room, then others,
-as many as `BUDGET` holds. Of all mutants a sample is drawn room by room at a fixed seed: one for
-each is worth what it would catch, and all of them would take days. Prints the share that was
-killed, and every survivor as a patch, to be read: a survivor is a missing test, or a change that
-changes nothing.
+mutmut's operators change one operator, number, text or argument of a function. Of all such mutants
+of a room a sample is drawn at a fixed seed: all of them would take days. Each is tried on the
+room's tests, first on those that reach its line, until one fails or `BUDGET` is spent. Prints the
+share that was killed by room, and every survivor as a patch, to be read: a survivor is a missing
+test, or a change that changes nothing.
 """
 
 from __future__ import annotations
 
 import argparse
+import difflib
 import json
 import random
-import re
 import shutil
 import subprocess
 import sys
-from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from pipelines.mutants_trial import PYTEST
+from libcst import MetadataWrapper, Module, parse_module
+from libcst.metadata import PositionProvider
+from mutmut.mutation.file_mutation import Mutation, MutationVisitor
+from mutmut.mutation.mutators import mutation_operators
+from mutmut.mutation.pragma_handling import IgnoredCode
 
+FRONT = ("cli", "test_api.py", "test_verbs.py")
+GOLDEN = ("golden",)
 ROOMS: dict[str, tuple[str, ...]] = {
-    "arm": ("test_arm.py", "golden"),
-    "model": ("estimators/test_model.py", "golden"),
-    "check": ("test_check.py",),
-    "base": ("test_units.py", "test_compiled.py", "test_staging.py", "test_stores.py"),
+    "api": FRONT,
+    "arm": ("test_arm.py", *GOLDEN),
+    "base": (
+        "test_arrow.py", "test_compiled.py", "test_credentials.py", "test_quantiles.py",
+        "test_significance.py", "test_staging.py", "test_stores.py", "test_units.py", "readers",
+    ),
     "batches": ("batches",),
-    "cli": ("cli",),
+    "cli": FRONT,
     "designs": ("designs",),
-    "estimators": ("estimators", "golden"),
+    "estimators": ("estimators", *GOLDEN),
     "exports": ("exports",),
     "fleet": ("fleet",),
-    "identification": ("identification", "golden"),
-    "inspection": ("inspection", "golden"),
-    "physics": ("physics", "estimators/test_model.py", "golden"),
-    "readers": ("readers", "golden"),
+    "identification": ("identification", *GOLDEN),
+    "inspection": ("inspection",),
+    "model": ("estimators/test_model.py", *GOLDEN),
+    "notices": ("test_notices.py", "test_check.py", *FRONT),
+    "options": FRONT,
+    "physics": ("physics", "estimators/test_model.py", *GOLDEN),
+    "profile": (*FRONT, "inspection/test_commands.py"),
+    "readers": ("readers",),
     "report": ("report", "test_verbs.py"),
-    "signals": ("signals", "golden"),
+    "results": ("report", "fleet", "identification/test_outcome.py", "test_check.py", *FRONT),
+    "settings": FRONT,
+    "signals": ("signals", *GOLDEN),
     "synth": ("synth", "cli/test_ends.py"),
     "tracks": ("tracks",),
-}
-"""By room, the tests that are to see its mutants; those in which a mutant's code is not reached
-are not run."""
-USUAL = ("arm", "model", "check", "estimators", "signals", "tracks", "fleet", "inspection")
-COPIED = ("tests", "pipelines", "data", "README.md", "CHANGELOG.md", "LICENSE", "constraints.txt")
+}  # fmt: skip
+"""By room, the tests that are to see its mutants. Small rooms may be joined: `cli+settings`."""
+USUAL = ("arm", "model", "estimators", "signals", "tracks", "fleet", "inspection")
+COPIED = ("algid", "tests", "pipelines", "data", "README.md", "CHANGELOG.md", "LICENSE",
+    "constraints.txt", "pyproject.toml")  # fmt: skip
 BUDGET = 20.0  # s of tests for a mutant
-STATS = "mutants/mutmut-stats.json"  # which tests touch what, and how long they take
 LIMIT = 4  # times as much processor time as its tests took: a mutant that takes more never ends
 
 
-def prepare(folder: Path, rooms: Sequence[str]) -> None:
-    """Make a copy of the project in `folder` in which mutmut can work on `rooms`."""
-    patterns = [
-        f"algid/{name}/*" if Path("algid", name).is_dir() else f"algid/{name}.py" for name in rooms
-    ]
-    selection = sorted({test for name in rooms for test in ROOMS[name]})
-    nothing = [name for name in patterns if not any(Path().glob(name))]
-    nothing += [f"tests/{name}" for name in selection if not Path("tests", name).exists()]
-    if nothing:
-        raise SystemExit(f"{', '.join(nothing)}: names nothing; mend ROOMS")
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    for name in ("algid", *COPIED):
-        source = Path(name)
-        (shutil.copytree if source.is_dir() else shutil.copy)(source, folder / name)
-    options = {
-        "source_paths": ["algid"],
-        "only_mutate": patterns,
-        "also_copy": list(COPIED),
-        "pytest_add_cli_args": PYTEST,
-        "pytest_add_cli_args_test_selection": [f"tests/{name}" for name in selection],
-        "use_git_change_detection": False,
-    }
-    lines = [f"{key} = {json.dumps(value)}" for key, value in options.items()]
-    text = Path("pyproject.toml").read_text(encoding="utf-8")
-    (folder / "pyproject.toml").write_text(
-        text + "\n[tool.mutmut]\n" + "\n".join(lines) + "\n", encoding="utf-8"
-    )
+@dataclass(frozen=True)
+class Mutant:
+    """A change of one file; `name` is path, line and the number among the file's changes."""
+
+    path: Path
+    lines: range
+    name: str
+    module: Module
+    change: Mutation
+
+    @property
+    def text(self) -> str:
+        """The whole file as it is with the change."""
+        whole: Any = self.module.deep_replace(self.change.original_node, self.change.mutated_node)
+        return str(whole.code)
+
+    @property
+    def patch(self) -> str:
+        """What changes, with a line about it."""
+        both = (self.module.code.splitlines(), self.text.splitlines())
+        return "\n".join(list(difflib.unified_diff(*both, lineterm="", n=1))[2:])
 
 
-def chosen(tests: list[str], seconds: dict[str, float], name: str) -> list[str]:
-    """Of the tests that touch a mutant those of its module first, then those of its room, within
-    `BUDGET`.
+def mutants(path: Path) -> Iterator[Mutant]:
+    """All mutants of a file's functions."""
+    wrapper = MetadataWrapper(parse_module(path.read_text(encoding="utf-8")))
+    positions = wrapper.resolve(PositionProvider)
+    visitor = MutationVisitor(mutation_operators, IgnoredCode(set(), set(), set()))
+    module = wrapper.visit(visitor)
+    for number, change in enumerate(visitor.mutations):
+        if change.contained_by_top_level_function is not None:
+            place = positions[change.original_node]
+            lines = range(place.start.line, place.end.line + 1)
+            yield Mutant(path, lines, f"{path}:{lines[0]}:{number}", module, change)
+
+
+def files(room: str) -> list[Path]:
+    """The files of a room, or of several that are joined.
+
+    Raises
+    ------
+    SystemExit
+        Where there are none.
     """
-    module, own = name.split(".")[-2], room(name)
-    named = (f"test_{module}.py", f"test_{module}s.py")
+    found: list[Path] = []
+    for name in room.split("+"):
+        own = sorted(Path("algid", name).rglob("*.py")) + sorted(Path("algid").glob(f"{name}.py"))
+        if name not in ROOMS or not own:
+            raise SystemExit(f"{name}: no room; mend ROOMS")
+        found += own
+    return found
+
+
+def tests_of(room: str) -> list[str]:
+    """The tests of a room.
+
+    Raises
+    ------
+    SystemExit
+        Where one is absent.
+    """
+    tests = [f"tests/{test}" for name in room.split("+") for test in ROOMS[name]]
+    if absent := [test for test in tests if not Path(test).exists()]:
+        raise SystemExit(f"{', '.join(absent)}: no such test; mend ROOMS")
+    return list(dict.fromkeys(tests))
+
+
+def chosen(mutant: Mutant, seconds: dict[str, float], lines: dict[str, list[str]]) -> list[str]:
+    """Of the room's tests those that reach the mutant's lines first, then those beside them: what
+    a fixture or another process reaches is told of one test alone.
+    """
+    reach = {test for line in mutant.lines for test in lines.get(str(line), ())}
+    beside = {test.partition("::")[0] for test in reach}
     kept: list[str] = []
     spent = 0.0
-
-    def far(test: str) -> tuple[bool, bool, float]:
-        file = test.partition("::")[0]
-        return (
-            not file.endswith(named),
-            not file.startswith((f"tests/{own}/", f"tests/test_{own}")),
-            seconds[test],
-        )
-
-    for test in sorted(tests, key=far):
+    for test in sorted(
+        seconds, key=lambda t: (t not in reach, t.partition("::")[0] not in beside, seconds[t])
+    ):
         spent += seconds[test]
         if kept and spent > BUDGET:
             break
@@ -107,112 +151,87 @@ def chosen(tests: list[str], seconds: dict[str, float], name: str) -> list[str]:
     return kept
 
 
-def names_in(folder: Path) -> list[str]:
-    """The mutants' names."""
-    metas = sorted((folder / "mutants").rglob("*.py.meta"))
-    return [
-        name
-        for path in metas
-        for name in json.loads(path.read_text(encoding="utf-8"))["exit_code_by_key"]
-    ]
-
-
-def jobs(folder: Path, drawn: list[str]) -> Iterator[tuple[str, list[str], int]]:
-    """Each mutant with its tests, by name, and the seconds of processor time that they may take."""
-    known = json.loads((folder / STATS).read_text(encoding="utf-8"))
-    seconds = known["duration_by_test"]
-    for name in drawn:
-        touching = known["tests_by_mangled_function_name"].get(name.rpartition("__mutmut_")[0], [])
-        tests = chosen(touching, seconds, name)
-        yield name, tests, round(20 + LIMIT * sum(seconds[test] for test in tests))
-
-
-def tried(folder: Path, drawn: list[str]) -> Iterator[tuple[str, str]]:
-    """Each mutant with its end as soon as that is known: ``killed``, ``survived`` or
-    ``no test``.
+def tried(folder: Path, drawn: list[Mutant], room: str) -> Iterator[tuple[Mutant, str]]:
+    """Each mutant with its end as soon as that is known.
 
     Raises
     ------
     SystemExit
-        Where the trial breaks off.
+        Where the tests fail without a mutant, or the trial breaks off.
     """
-    known = list(jobs(folder, drawn))
-    yield from ((name, "no test") for name, tests, _ in known if not tests)
-    lines = "".join(json.dumps(job) + "\n" for job in known if job[1])
-    (folder / "jobs").write_text(lines, encoding="utf-8")
     trial = [sys.executable, "-m", "pipelines.mutants_trial"]
+    asked = {"tests": tests_of(room), "sources": [str(path) for path in files(room)]}
+    recorded = subprocess.run(
+        [*trial, json.dumps(asked)], cwd=folder, capture_output=True, text=True
+    )
+    if recorded.returncode:
+        raise SystemExit(recorded.stdout[-3000:] + recorded.stderr[-1000:])
+    known: dict[str, Any] = json.loads((folder / "reached.json").read_text(encoding="utf-8"))
+    by_name = {mutant.name: mutant for mutant in drawn}
+    with (folder / "jobs").open("w", encoding="utf-8") as jobs:
+        for mutant in drawn:
+            tests = chosen(mutant, known["seconds"], known["lines"].get(str(mutant.path), {}))
+            job = {
+                "name": mutant.name,
+                "path": str(mutant.path),
+                "text": mutant.text,
+                "tests": tests,
+                "limit": round(20 + LIMIT * sum(known["seconds"][test] for test in tests)),
+            }
+            if mutant is drawn[0]:  # the same tests without a change
+                text = mutant.module.code
+                jobs.write(json.dumps(job | {"name": "nothing", "text": text}) + "\n")
+            jobs.write(json.dumps(job) + "\n")
     with (folder / "jobs").open() as stdin:
         running = subprocess.Popen(
-            trial, cwd=folder / "mutants", stdin=stdin, stdout=subprocess.PIPE, text=True
+            trial, cwd=folder, stdin=stdin, stdout=subprocess.PIPE, text=True
         )
         for line in running.stdout or ():
-            name, code = line.split()
-            yield name, "survived" if code == "0" else "killed"
+            name, end = line.split()
+            if name in by_name:
+                yield by_name[name], end
+            elif end != "survived":
+                running.terminate()
+                raise SystemExit("tests fail in a fork without a mutant")
         if running.wait():
             raise SystemExit("the trial broke off: see above")
-
-
-def room(name: str) -> str:
-    """The room of a mutant."""
-    parts = name.split(".")
-    return parts[1] if len(parts) > 2 else parts[0]
-
-
-def sample(names: list[str], count: int, seed: int) -> list[str]:
-    """About `count` of the names, each room's share its share of all mutants, at least two."""
-    by_room: dict[str, list[str]] = defaultdict(list)
-    for name in sorted(names):
-        by_room[room(name)].append(name)
-    draw = random.Random(seed)
-    shares = {key: max(2, round(count * len(own) / len(names))) for key, own in by_room.items()}
-    return [
-        name
-        for key, own in by_room.items()
-        for name in draw.sample(own, min(shares[key], len(own)))
-    ]
 
 
 def main() -> None:
     """Draw mutants, try them, print the score; exit 1 where it is below what is asked."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("rooms", nargs="*", default=USUAL, metavar="ROOM")
-    parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--count", type=int, default=100, help="mutants of a room")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--asked", type=float, default=0.85)
     parser.add_argument("--folder", type=Path, default=Path("build/mutants"))
-    parser.add_argument(
-        "--again", action="store_true", help="draw from the mutants that FOLDER holds from before"
-    )
+    parser.add_argument("--only", nargs="+", default=(), help="names of those that are to be tried")
     options = parser.parse_args()
-    mutmut = [str(Path(sys.executable).with_name("mutmut"))]
-    if not options.again:
-        prepare(options.folder, options.rooms)
-        # A name that none has: the mutants are made and the tests timed, nothing more.
-        timed = subprocess.run(
-            [*mutmut, "run", "none of them"], cwd=options.folder, capture_output=True, text=True
+    shutil.rmtree(options.folder, ignore_errors=True)
+    options.folder.mkdir(parents=True)
+    for name in COPIED:
+        source = Path(name)
+        (shutil.copytree if source.is_dir() else shutil.copy)(source, options.folder / name)
+    below = False
+    for room in options.rooms:
+        every = [mutant for path in files(room) for mutant in mutants(path)]
+        drawn = random.Random(options.seed).sample(every, min(options.count, len(every)))
+        drawn = [mutant for mutant in drawn if not options.only or mutant.name in options.only]
+        ends: Counter[str] = Counter()
+        for mutant, end in tried(options.folder, drawn, room):
+            ends[end] += 1
+            print(f"{ends.total()} of {len(drawn)}", end="\r", file=sys.stderr, flush=True)
+            if end != "killed":
+                print(f"# {mutant.name}: {end}\n{mutant.patch}\n", flush=True)
+        share = 1 - ends["survived"] / ends.total()
+        below |= share < options.asked
+        print(
+            f"{room}: killed {ends['killed']} and hung {ends['hung']} of {ends.total()}, drawn of "
+            f"{len(every)} by seed {options.seed}: {100 * share:.0f} % (asked "
+            f"{100 * options.asked:.0f} %)",
+            flush=True,
         )
-        if not (options.folder / STATS).exists():
-            raise SystemExit(f"{timed.stdout[-3000:]}\nthe tests fail before a mutant is tried")
-    drawn = sample(names_in(options.folder), options.count, options.seed)
-    ends: dict[str, str] = {}
-    for name, end in tried(options.folder, drawn):
-        ends[name] = end
-        print(f"{len(ends)} of {len(drawn)}", end="\r", file=sys.stderr, flush=True)
-        if end != "killed":
-            shown = subprocess.run(
-                [*mutmut, "show", name], cwd=options.folder, capture_output=True, text=True
-            )
-            print(re.sub(r"^(?![-+@]).*\n", "", shown.stdout, flags=re.MULTILINE), end="")
-            print(f"# {name}: {end}\n", flush=True)
-    killed = Counter(room(name) for name, end in ends.items() if end == "killed")
-    for key, number in sorted(Counter(map(room, ends)).items()):
-        print(f"{key:12} {killed[key]:3} of {number:3}")
-    share = killed.total() / len(ends)
-    print(
-        f"killed {killed.total()} of {len(ends)}: {100 * share:.0f} % (asked "
-        f"{100 * options.asked:.0f} %)"
-    )
-    raise SystemExit(0 if share >= options.asked else 1)
+    raise SystemExit(below)
 
 
 if __name__ == "__main__":

@@ -1,62 +1,136 @@
-"""Tries mutants, for `pipelines.mutants`: run in mutmut's copy of the project, where each name
-switches one change on.
+"""Runs tests for `pipelines.mutants` in the copy of the project, each run in a fork of a process
+that has what algid imports, but not algid.
 
-Reads lines of JSON: a mutant's name, its tests, the seconds of processor time that they may take.
-Writes a line for each: the name, and what pytest ended with in a process of its own (0 where no
-test failed; negative: a signal).
+Reads lines of JSON: a mutant, a file, its text, the tests, the seconds of processor time that they
+may take. Writes a line for each: the mutant, and how the tests ended.
 """
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import resource
+import shutil
+import signal
 import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from importlib import import_module
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-PYTEST = ("-p", "no:xdist", "-o", "addopts=-q -m 'not slow'", "-o", "filterwarnings=")
-"""How the tests are run, by mutmut as it times them too."""
+PYTEST = (
+    "--rootdir=.", "-p", "no:xdist", "-p", "no:cacheprovider", "-o", "addopts=-q -m 'not slow'",
+    "-o", "filterwarnings=", "--hypothesis-seed=0",
+)  # fmt: skip
+LOADED = (
+    "hypothesis", "numpy", "scipy.integrate", "scipy.interpolate", "scipy.linalg",
+    "scipy.optimize", "scipy.stats", "pydantic", "jinja2", "click", "plotly.graph_objects",
+    "polars", "pyarrow.csv", "pyarrow.fs", "pyarrow.parquet", "rich.progress",
+)  # fmt: skip
+SLOWEST = 10  # times the processor time: a mutant that waits longer than that hangs
+MEMORY = 8 << 30  # bytes
 
 
-def _quietly(arguments: list[str]) -> int:
-    """What pytest ends with; what it prints is thrown away."""
-    nothing = os.open(os.devnull, os.O_WRONLY)
-    kept = [os.dup(stream) for stream in (1, 2)]
-    for stream in (1, 2):
-        os.dup2(nothing, stream)
+class Recorder:
+    """Which lines each test reaches, and how long it takes."""
+
+    def __init__(self, coverage: Any) -> None:
+        self.coverage = coverage
+        self.seconds: dict[str, float] = {}
+        self.failed: list[str] = []
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+        """A context a test, its fixtures among it."""
+        self.coverage.switch_context(item.nodeid)
+        start = time.monotonic()
+        done = yield
+        self.seconds[item.nodeid] = time.monotonic() - start
+        return done
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Tests that fail see no mutant."""
+        if report.failed:
+            self.failed.append(report.nodeid)
+
+
+def record(tests: list[str], sources: list[str]) -> None:
+    """Write ``reached.json``: seconds by test, and tests by line of the sources."""
+    from coverage import Coverage
+
+    coverage = Coverage(data_file=None, include=sources)
+    recorder = Recorder(coverage)
+    coverage.start()
+    code = pytest.main([*PYTEST, *tests], plugins=[recorder])
+    coverage.stop()
+    if code or recorder.failed:
+        raise SystemExit(f"tests fail before a mutant is tried: {recorder.failed}")
+    data = coverage.get_data()
+    lines = {os.path.relpath(path): data.contexts_by_lineno(path) for path in data.measured_files()}
+    text = json.dumps({"seconds": recorder.seconds, "lines": lines})
+    Path("reached.json").write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def changed(path: Path, text: str) -> Iterator[None]:
+    """The file holds the mutant's text."""
+    before, times = path.read_bytes(), path.stat()
+    path.write_text(text, encoding="utf-8")
     try:
-        return int(pytest.main(["--rootdir=.", "-p", "no:cacheprovider", *PYTEST, *arguments]))
+        yield
     finally:
-        for stream, was in zip((1, 2), kept, strict=True):
-            os.dup2(was, stream)
+        path.write_bytes(before)
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))  # its bytecode is good again
 
 
-def _tried(name: str, tests: list[str], limit: int) -> int:
+def tried(tests: list[str], limit: int) -> str:
+    """How the tests end in a process of their own: ``survived``, ``killed`` or ``hung``."""
     child = os.fork()
     if child == 0:
+        os.setsid()  # what it starts ends with it
         resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 5))
-        os.environ["MUTANT_UNDER_TEST"] = name
+        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+        nothing = os.open(os.devnull, os.O_RDWR)
+        for stream in (0, 1, 2):
+            os.dup2(nothing, stream)
         code = 3
         try:
-            code = _quietly(["-x", *tests])
+            code = int(pytest.main([*PYTEST, "-x", *tests]))
         finally:
             os._exit(code)
-    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    end = time.monotonic() + SLOWEST * limit
+    while not (ended := os.waitpid(child, os.WNOHANG))[0] and time.monotonic() < end:
+        time.sleep(0.02)
+    with suppress(ProcessLookupError):
+        os.killpg(child, signal.SIGKILL)
+    status = ended[1] if ended[0] else os.waitpid(child, 0)[1]
+    shutil.rmtree(".hypothesis", ignore_errors=True)  # examples of this mutant are not the next's
+    code = os.waitstatus_to_exitcode(status)
+    if code in (-signal.SIGXCPU, -signal.SIGKILL):
+        return "hung"
+    return "killed" if code else "survived"
 
 
 def main() -> None:
-    """Import all tests once, then a process a mutant."""
-    jobs = [json.loads(line) for line in sys.stdin]
-    os.environ["MUTANT_UNDER_TEST"] = ""
-    _quietly(
-        [
-            "--collect-only",
-            *sorted({test.partition("::")[0] for _, tests, _ in jobs for test in tests}),
-        ]
-    )
-    for name, tests, limit in jobs:
-        print(name, _tried(name, tests, limit), flush=True)
+    """Try each mutant of standard input."""
+    if sys.argv[1:]:
+        record(**json.loads(sys.argv[1]))
+        return
+    os.environ["PYTHONDONTWRITEBYTECODE"] = "1"  # one of a mutant would outlive it
+    sys.dont_write_bytecode = True
+    for name in LOADED:
+        import_module(name)
+    gc.freeze()
+    for line in sys.stdin:
+        job = json.loads(line)
+        with changed(Path(job["path"]), job["text"]):
+            end = tried(job["tests"], job["limit"])
+        print(job["name"], end, flush=True)
 
 
 if __name__ == "__main__":

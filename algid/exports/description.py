@@ -161,7 +161,7 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
         conditioned=conditioned,
         known=known,
         links=chosen,
-        turn=turn_of(value, model.gravity),
+        turn=turn_of(value),
         told=told,
         weighed=bool(tied),
         warnings=contradictions(result, known),

@@ -60,7 +60,7 @@ class Link:
     mass: float
     centre: float
     inertia: float
-    aside: float = 0.0
+    aside: float
 
     @property
     def tensor(self) -> tuple[float, float, float]:
@@ -68,15 +68,13 @@ class Link:
         return ALONG * self.inertia, self.inertia, self.inertia
 
 
-def turn_of(k: Mapping[str, float], gravity: float) -> float:
+def turn_of(k: Mapping[str, float]) -> float:
     """ε in rad: what is to be added to θ1 so that it counts from the horizontal.
 
-    0 without gravity, or where the moments have no sine parts.
+    0 without gravity, which leaves no K2.
     """
     first, second, _ = moments_of(k)
-    if gravity == 0 or not (first.imag or second.imag):
-        return 0.0
-    return cmath.phase(second / first)
+    return cmath.phase(second / first) if first else 0.0
 
 
 def links_of(
@@ -90,7 +88,7 @@ def links_of(
         If what is known leaves no positive mass or inertia.
     """
     K1, K2, K4 = moments_of(k)
-    level = cmath.exp(-1j * turn_of(k, gravity))
+    level = cmath.exp(-1j * turn_of(k))
     s2, h2 = K2 * level / gravity if gravity else K1 / l1, k[K3]
     h, s = k[K5] - knowns.get("rotor1", 0.0), K4 * level / gravity if gravity else 0j  # at m2 = 0
 

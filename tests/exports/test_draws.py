@@ -27,7 +27,8 @@ NU = 9.0
 
 def correlated(seed: int = 5, std: float = 0.01, value: dict[str, float] = VALUE) -> Result:
     """A result of ν = 9 whose errors are correlated, payload included."""
-    made = result_of(value, FRICTION, payload={"m_p": 0.5, "l1": 0.4, "l2": 0.3}, std=std)
+    payload = {"m_p": 0.5, "l1": 0.4, "l2": 0.3, "y_p": 0.01, "J_p": 0.002}
+    made = result_of(value, FRICTION, payload=payload, std=std)
     assert made.fit is not None
     size = np.sqrt(np.diag(made.covariance))
     mixed = np.random.default_rng(seed).normal(size=(size.size, 3 * size.size))
@@ -54,7 +55,8 @@ def drawn(
 def test_draws_are_students_with_the_estimates_covariance() -> None:
     result, count = correlated(std=1e-3), 3000
     manifest, files = drawn(result, "parquet", count, 1)
-    assert (manifest["refused"], manifest["distribution"]) == (0, "Student's t")
+    said = {"result": "arm", "estimator": "refined", "seed": 1, "refused": 0, "known": {}}
+    assert manifest | said | {"distribution": "Student's t", "from_prior": []} == manifest
     assert manifest["degrees_of_freedom"] == pytest.approx(NU, rel=1e-6)
     assert drawn(result_of(VALUE, FRICTION), "csv", 1, 0)[0]["degrees_of_freedom"] is None
     names, covariance = manifest["names"], np.array(manifest["covariance"])
@@ -81,7 +83,7 @@ def test_every_draw_is_a_possible_arm() -> None:
     manifest, files = drawn(result, "urdf", 50, 3)
     assert manifest["refused"] > 10
     for row in manifest["draws"]:
-        assert min(row[name] for name in ("k3", "k5", "k6", "k7", "f1", "m_p", "l2")) >= 0
+        assert min(row[name] for name in ("k3", "k5", "k6", "k7", "f1", "m_p", "l2", "J_p")) >= 0
         assert row["k3"] * row["k5"] > row["k1"] ** 2
         said = re.findall(r'(?:mass value|ixx|iyy|izz)="([^"]+)"', files[row["file"]].decode())
         assert len(said) == 8
@@ -148,3 +150,5 @@ def test_draws_of_what_has_no_error_bars_are_refused() -> None:
         algid.export(bare, "csv", draws=2)
     with pytest.raises(SettingError, match="--draws: expected greater than or equal to 1, found 0"):
         algid.export(bare, "csv", draws=0)
+    with pytest.raises(SettingError, match=r"^--draws: payload has no draws; leave it out$"):
+        algid.export(bare, "payload", draws=2)
