@@ -40,6 +40,8 @@ from algid.notices import Notice
 IntArray = NDArray[np.int64]
 
 CANONICAL_COLUMNS = ("t", "theta1", "theta2", "tau1", "tau2")
+ARRAYS = "arrays"
+"""The format of a log that is made of arrays."""
 SIGNALS = ("theta", "tau", "omega", "reference")
 """Fields of a log (2, N)."""
 
@@ -160,7 +162,8 @@ class Reading:
             # offsets written in different units differ by rounding
             offset = f"{round(one.offset, 9) + 0.0:.6g}"
             found |= {f"{name}.unit": one.unit, f"{name}.sign": f"{one.sign}"}
-            found[f"{name}.offset"] = offset
+            # by the unit, which has a factor of its own
+            found |= {f"{name}.offset": offset, f"{name} per {one.unit}": f"{abs(one.factor):.6g}"}
         return found
 
 
@@ -284,7 +287,7 @@ class Log:
             if values is not None
         }
         stamp_ns = np.round(times * 1e9).astype(np.int64)
-        return cls(stamp_ns, origin=Origin(name, "arrays", {}), notices=notices, **signals)
+        return cls(stamp_ns, origin=Origin(name, ARRAYS, {}), notices=notices, **signals)
 
     def __len__(self) -> int:
         return self.stamp_ns.size

@@ -323,6 +323,11 @@ def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
         raise SettingError(f"{flag(place if of_channel else name)}: {why}") from error
 
 
+def lasting(stated: Mapping[str, Any]) -> dict[str, Any]:
+    """What was stated of a result's logs and holds of later ones, by name."""
+    return {name: one for name, one in stated.items() if name not in OF_ONE_LOG}
+
+
 def over(profile: Profile | None, earlier: Mapping[str, Any]) -> Profile | None:
     """The profile of an earlier result, as that holds it, with what `profile` sets over it.
 

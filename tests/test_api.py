@@ -159,6 +159,8 @@ def test_readings_differ_by_what_decides_the_estimates() -> None:
     assert other(unit="N m") == ["tau1.unit mN m instead of N m"]
     assert other(factor=1e-3) == ["tau1.sign -1 instead of 1"]
     assert other(offset=0.5) == ["tau1.offset 0.25 instead of 0.5"]
+    assert other(factor=-2e-3) == ["tau1 per mN m 0.001 instead of 0.002"]
+    assert other(factor=-1.0, unit="N m") == ["tau1.unit mN m instead of N m"]
 
 
 def test_a_log_is_made_of_arrays_either_way_round_and_gives_the_same_result() -> None:
@@ -235,6 +237,31 @@ def test_settings_of_a_reading_hold_for_arrays_as_for_a_file(tmp_path: Path) -> 
     with pytest.raises(SettingError, match=r"^zero: .*arm\.csv has been read already"):
         algid.track(read, found, zero="hanging")
     assert algid.identify(read, estimator="weak", end=1.0).log.rows == 1001
+
+
+def test_what_was_said_of_arrays_holds_of_later_ones() -> None:
+    log, loaded = algid.synthesise("case1", duration=2.0, torque="wide", torque_noise=1e-2)
+    hanging = np.array([[np.pi / 2], [0.0]])
+    one, two = (
+        algid.Log.from_arrays(each.t, each.theta - hanging, 1e3 * each.tau)
+        for each in (log, loaded)
+    )
+    arm = algid.identify(one, estimator="weak", model="plain", zero="upright", torque_unit="mN m")
+    found = algid.identify(None, [two], parameters=arm, estimator="weak", model="plain")
+    assert found.payload["m_p"].estimate == pytest.approx(0.3515, rel=0.05)
+    validated = algid.validate(arm, one)
+    assert (min(validated.total.r2) > 0.999, validated.warnings) == (True, ())
+    left = arm.predict(one).select(pl.col("tau1") - pl.col("tau1_predicted")).to_series()
+    assert left.fill_nan(None).std() < 0.02 * np.std(log.tau[0])
+    (stretch,) = algid.track(two, arm, l1=0.1626, l2=0.1232).track.stretches
+    assert stretch.m_p == pytest.approx(0.3515, rel=0.05)
+    # arrays of SI units stay what they are beside a file, or where they were read before
+    as_columns = {"t": one.t, "q": one.theta, "tau": one.tau}
+    of_dict = algid.identify(as_columns, estimator="weak", zero="upright", torque_unit="mN m")
+    plain = algid.Log.from_arrays(log.t, log.theta, log.tau)
+    assert min(algid.validate(of_dict, plain).total.r2) > 0.999
+    read = algid.read_log(as_columns, zero="upright", torque_unit="mN m")
+    assert min(algid.validate(arm, read).total.r2) > 0.999
 
 
 def test_a_design_and_a_comparison_take_results_in_memory(tmp_path: Path) -> None:

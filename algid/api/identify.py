@@ -107,7 +107,7 @@ def identify(
     from algid.identification.identify import identify as run
 
     asked, of_profile = settings_of(settings, options)
-    own, unloaded, loaded = meant(profile, of_profile, unloaded, loaded)
+    own, unloaded, loaded = meant(profile, of_profile, unloaded, loaded, earlier=parameters)
     if export and not report:
         raise SettingError(
             f"{flag('export')}: the log is made from the time series; leave "

@@ -45,7 +45,7 @@ from algid.options import (
     flag,
     refuse_moved,
 )
-from algid.profile import Effort, Profile, load_profile, over, with_settings
+from algid.profile import Effort, Profile, lasting, load_profile, over, with_settings
 from algid.settings import DEFAULTS, OF_BOTH, Settings
 
 if TYPE_CHECKING:
@@ -266,7 +266,12 @@ def settings_of(
     return asked, of_profile
 
 
-def meant(profile: ProfileLike | None, options: Mapping[str, Any], *logs: Any) -> Any:
+def meant(
+    profile: ProfileLike | None,
+    options: Mapping[str, Any],
+    *logs: Any,
+    earlier: AnyResult | None = None,
+) -> Any:
     """The profile with single settings over it; and the logs, those in memory as it has them.
 
     Parameters
@@ -275,6 +280,8 @@ def meant(profile: ProfileLike | None, options: Mapping[str, Any], *logs: Any) -
     options : mapping
         By the names of the fields of `Profile`.
     *logs : as a verb takes them
+    earlier : Result or path of one
+        What was said of its logs in memory holds of these, where the profile is silent.
 
     Raises
     ------
@@ -298,18 +305,23 @@ def meant(profile: ProfileLike | None, options: Mapping[str, Any], *logs: Any) -
         own = with_settings(own or Profile(), options)
     if not logs:
         return own
-    return own, *(_in_memory(one, own) for one in logs)
+    return own, *(_in_memory(one, own, earlier) for one in logs)
 
 
-def _in_memory(given: Any, profile: Profile | None) -> Any:
-    """A log or several, those in memory as the profile has them."""
-    from algid.log import Log
+def _in_memory(given: Any, profile: Profile | None, earlier: AnyResult | None) -> Any:
+    """A log or several, those in memory as the profile, or else the earlier result, has them."""
+    from algid.log import ARRAYS, Log
     from algid.readers.memory import with_profile
 
     if isinstance(given, Log):
+        if earlier is not None and not given.origin.reading.channels:
+            before = opened(earlier)
+            # of files nothing is known of arrays, which are in SI units unless something is said
+            if before.log.format == ARRAYS:
+                profile = over(profile, lasting(before.profile))
         return with_profile(given, profile)
     if isinstance(given, Sequence | Iterator) and not isinstance(given, str):
-        return [_in_memory(one, profile) for one in given]
+        return [_in_memory(one, profile, earlier) for one in given]
     return given
 
 

@@ -69,7 +69,7 @@ class Result(results.Result):  # noqa: D101
         """
         from algid.identification.validate import predicted
 
-        own, log = meant(profile, options, log)
+        own, log = meant(profile, options, log, earlier=self)
         return predicted(self, log, "loaded" if loaded else "unloaded", own)
 
     def plot(self) -> Figure:

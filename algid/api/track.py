@@ -100,7 +100,7 @@ def track(
     from algid.tracks.page import track_folder, write_track
     from algid.tracks.payload import track_log
 
-    own, log = meant(profile, options, log)
+    own, log = meant(profile, options, log, earlier=parameters)
     name = str(log) if isinstance(log, str | Path) else "log"
     if isinstance(log, Log):
         name = log.origin.path

@@ -97,7 +97,11 @@ def validate(
     from algid.identification.validate import Validated, predictor_of
     from algid.identification.validate import validate as predicted
 
-    own, logs, loaded = meant(profile, options, logs, loaded)
+    urdf = None
+    if not isinstance(result, Result) and Path(result).suffix == ".urdf":
+        urdf = Path(result)
+    earlier = result if urdf is None else None
+    own, logs, loaded = meant(profile, options, logs, loaded, earlier=earlier)
     judged = () if max_error is None else tuple(judged_errors(opened(result), max_error))
     if logs is None and loaded is None:
         if max_error is None:
@@ -106,8 +110,8 @@ def validate(
             )
         return Validated(judged=judged)
     known, file = None, called(result)
-    if not isinstance(result, Result) and Path(result).suffix == ".urdf":
-        model = read_urdf(Path(result), own)
+    if urdf is not None:
+        model = read_urdf(urdf, own)
     else:
         known = opened(result)
         own = reused(own, known, file)

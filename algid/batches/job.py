@@ -11,6 +11,7 @@ import json
 import os
 import shutil
 import time
+from collections.abc import Iterable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -26,6 +27,7 @@ from algid.batches.jobs import Input, Job, JobRecord, JobStatus, redacted_path, 
 from algid.identification.identify import identify
 from algid.identification.recordings import Staged
 from algid.options import flag
+from algid.readers.two_files import torque_file_of
 from algid.results import Result
 from algid.settings import Settings
 
@@ -67,12 +69,20 @@ class Task:
             content["prior"] = sha256_of(Path(prior))
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The job's logs, and the files that the profile takes their torques from."""
+        logs = self.job.logs + self.job.loaded
+        name = self.profile and self.profile.torque_file
+        torques = [torque_file_of(path, name) for path in logs] if name else []
+        return logs + tuple(map(str, filter(None, torques)))
+
     def record(
         self, status: JobStatus, reason: str, inputs: tuple[Input, ...] | None = None, **known: Any
     ) -> JobRecord:
-        """The job's record; `inputs` are its logs as they are now by default."""
+        """The job's record; `inputs` are its files as they are now by default."""
         if inputs is None:
-            inputs = inputs_of(self.job)
+            inputs = inputs_of(self.files)
         job, settings = redacted(self.job), self.settings.as_json()
         return JobRecord(job, status, reason, self.basis, inputs, settings, __version__, **known)
 
@@ -86,7 +96,7 @@ def run_task(task: Task) -> JobRecord | str:
     keep_freed()
     keep_to_one_core()
     start = time.perf_counter()
-    inputs = inputs_of(task.job)
+    inputs = inputs_of(task.files)
     try:
         result = _identified(task)
     except BaseException as error:
@@ -138,13 +148,13 @@ def redacted(job: Job) -> Job:
     return replace(job, logs=logs, loaded=loaded, profile=profile)
 
 
-def inputs_of(job: Job) -> tuple[Input, ...]:
-    """The job's logs as they are now, not hashed.
+def inputs_of(files: Iterable[str]) -> tuple[Input, ...]:
+    """A job's files as they are now, not hashed.
 
     One that cannot be looked at is as one that is not there: its reader says why.
     """
     found = []
-    for path in job.logs + job.loaded:
+    for path in files:
         try:
             found.append(stat_of(path))
         except AlgidError:

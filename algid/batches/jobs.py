@@ -138,7 +138,9 @@ FAILURES = (JobStatus.FAILED, JobStatus.KILLED)
 
 @dataclass(frozen=True)
 class Input:
-    """A log as it was when the job started: size in bytes, time of change in ns, and its hash.
+    """A log, or a file of its torques, as it was when the job started.
+
+    Size in bytes, time of change in ns, and its hash.
 
     A URL stands without the credentials that the job's own holds. The hash decides nothing; it is
     None where there is no result.

@@ -184,7 +184,7 @@ class Batch:
             for job in jobs:
                 now[job.name] = ()  # whoever reads it says why it cannot be looked at
                 with suppress(AlgidError):
-                    now[job.name] = [stat_of(path) for path in job.logs + job.loaded]
+                    now[job.name] = list(map(stat_of, self._task_of(job).files))
                 held = job.trouble or all(one.size for one in now[job.name])
                 if held and now[job.name] == before.get(job.name):
                     settled.append(job)
@@ -209,7 +209,7 @@ class Batch:
             return f"of algid {record.version}" if other else "of other settings"
         if record.has_result and not self._store.exists(f"{task.job.name}.algid/result.json"):
             return "without their result"
-        inputs = tuple(map(stat_of, task.job.logs + task.job.loaded))
+        inputs = tuple(map(stat_of, task.files))
         same = (record.job.logs, record.inputs) == (redacted(task.job).logs, inputs)
         return "" if same else "of other logs"
 

@@ -62,9 +62,9 @@ def reused(profile: Profile | None, earlier: Result, file: str) -> Profile:
     SettingError
         If another gravity is stated than that of the earlier result, whose `file` is named.
     """
-    from algid.profile import OF_ONE_LOG, Profile, over
+    from algid.profile import Profile, lasting, over
 
-    known = {name: one for name, one in earlier.profile.items() if name not in OF_ONE_LOG}
+    known = lasting(earlier.profile)
     settings = Settings.of(earlier.settings)  # as its logs showed them
     for name in ("gravity", "effort"):
         if (shown := getattr(settings, name)) != DEFAULTS[name] or name in known:

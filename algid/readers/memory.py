@@ -163,7 +163,7 @@ def open_columns(given: FrameOrArrays) -> TableFile:
                 raise LogError(
                     f"{NAME}: {name!r} is no array ({error}); give numbers of one shape"
                 ) from error
-        return of_arrays(NAME, "arrays", arrays)
+        return of_arrays(NAME, "dict", arrays)
     import pyarrow as pa
 
     try:

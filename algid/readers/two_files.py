@@ -21,6 +21,12 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
 
+def torque_file_of(log: Any, name: str) -> Path | None:
+    """The file of a log's torques: beside it, else in the working folder; None where none is."""
+    beside = [Path(log).parent / name] if isinstance(log, str | Path) else []
+    return next((place for place in (*beside, Path(name)) if place.exists()), None)
+
+
 def open_with_torque_file(
     log: Any, profile: Profile, open_one: Callable[[Any, Profile], TableReader]
 ) -> TableReader:
@@ -41,8 +47,7 @@ def open_with_torque_file(
         If one of the two cannot be read, lacks its channels, or they do not overlap in time.
     """
     name = profile.torque_file or ""
-    beside = [Path(log).parent / name] if isinstance(log, str | Path) else []
-    other = next((place for place in (*beside, Path(name)) if place.exists()), None)
+    other = torque_file_of(log, name)
     if other is None:
         raise LogError(
             f"{name}: there is no such file of torques, neither beside the log nor in the working "

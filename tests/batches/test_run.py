@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -132,6 +133,25 @@ def test_a_changed_prior_is_another_setting(logs: Path) -> None:
         here = Here()
         _run(logs, here, settings)
         assert len(here.ran) == count
+
+
+def test_a_changed_file_of_torques_is_another_log(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("algid.api.batch._workers", lambda *_: nullcontext((Here().submit, 1)))
+    log = pl.read_parquet(made / "r1/a-unloaded.parquet")
+    angles, torques = tmp_path / "arm.csv", tmp_path / "torques.txt"
+    log.select("t", "theta1", "theta2").write_csv(angles)
+    k4 = []
+    for factor in (1, 1, 2):
+        log.select("t", pl.col("tau1", "tau2") * factor).write_csv(torques)
+        os.utime(torques, (factor, factor))
+        done = algid.batch(
+            angles, tmp_path / "out", torque_file=torques.name, estimator="weak", report=False
+        )
+        k4.append(done.records[0].estimates["k4"][0])
+    assert (done.ran, k4[1]) == (1, k4[0])
+    assert k4[2] == pytest.approx(2 * k4[0], rel=1e-6)
 
 
 def test_a_job_that_kills_its_workers_is_set_aside(logs: Path) -> None:
