@@ -254,15 +254,14 @@ def merged(notices: Iterable[Notice]) -> list[Notice]:
     return list(together.values())
 
 
-def flat(settings: Mapping[str, Any]) -> dict[str, Any]:
+def flat(settings: Mapping[str, Any], above: str = "") -> dict[str, Any]:
     """Settings by their names with dots, as a `Remedy` has them; without those that are None."""
     by_name: dict[str, Any] = {}
     for name, value in settings.items():
         if isinstance(value, Mapping):
-            for key, inner in value.items():
-                by_name[f"{name}.{key}"] = inner
+            by_name |= flat(value, f"{above}{name}.")
         elif value is not None:
-            by_name[name] = value
+            by_name[above + name] = value
     return by_name
 
 

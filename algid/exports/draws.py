@@ -14,7 +14,6 @@ from __future__ import annotations
 import io
 import json
 from dataclasses import replace
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from scipy.special import stdtridf
 
 from algid import __version__
 from algid.base.errors import ResultError, SettingError
-from algid.base.names import within
+from algid.base.names import vector, within
 from algid.estimators.diagnostics import bounds
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.exports.description import describe
@@ -36,8 +35,6 @@ from algid.results import Result
 TABLES = ("csv", "parquet")
 _HOPELESS = 100
 """Draws in a row that no arm is like, which says that the estimates are none's."""
-_MOST_FREEDOM = 1e6
-"""Degrees of freedom beyond which Student's t is all but normal."""
 
 
 def drawn_files(
@@ -70,8 +67,8 @@ def drawn_files(
     size = np.sqrt(np.diag(covariance))
     size[size == 0] = 1.0
     still, correlation = np.zeros(len(names)), covariance / np.outer(size, size)
+    # of normal intervals 1e10
     freedom, random = float(stdtridf(0.975, result.quantile)), np.random.default_rng(seed)
-    freedom = inf if freedom > _MOST_FREEDOM else freedom
     shared = Shared(model, payload="m_p" in names, body=within(BODY_PARAMETERS, names))
     broken = list[str]()
     files: dict[str, bytes] = {"manifest.json": b""}
@@ -83,12 +80,12 @@ def drawn_files(
                 f"{file}: {_HOPELESS} draws in a row are no arm ({broken[-1]}); identify it from "
                 "more informative logs"
             )
-        wide = 1.0 if freedom == inf else np.sqrt(freedom / random.chisquare(freedom))
+        wide = np.sqrt(freedom / random.chisquare(freedom))
         one_each = random.multivariate_normal(
             still, correlation, method="eigh", check_valid="ignore"
         )
         numbers = dict(zip(names, (mean + size * one_each * wide).tolist(), strict=True))
-        beta = np.array([numbers.get(name, 0.0) for name in shared.names])
+        beta = vector(shared.names, numbers, 0.0)
         broken = [name for name, value in bounds(shared, beta).items() if value < 0]
         moved = {}
         for kind, given in (("parameters", result.parameters), ("payload", result.payload)):
@@ -118,11 +115,11 @@ def drawn_files(
         "seed": seed,
         "refused": refused,
         "known": {**knowns},
-        "distribution": "normal" if freedom == inf else "Student's t",
-        "degrees_of_freedom": None if freedom == inf else freedom,
+        "distribution": "Student's t",
+        "degrees_of_freedom": freedom,
         "names": list(names),
         "from_prior": [name for name in names if result.estimates[name].status == "FROM_PRIOR"],
-        "estimates": [result.estimates[name].estimate for name in names],
+        "estimates": mean.tolist(),
         "covariance": covariance.tolist(),
         "draws": rows,
     }

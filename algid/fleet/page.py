@@ -18,7 +18,7 @@ from algid.model import UNITS
 from algid.notices import Notice, Verdict, graded
 from algid.report.document import Document, Section, Table
 from algid.report.plot import Panels
-from algid.report.render import page
+from algid.report.render import page, write_texts
 
 MOST_ROBOTS = 40  # whose table is printed
 MOST_ROWS = 200
@@ -50,9 +50,8 @@ def write_history(history: History, out: Path) -> tuple[Document, list[Path]]:
         kicker="a fleet's history",
         name="Fleet",
     )
-    with whole_file(out / "fleet.html") as temporary:
-        temporary.write_text(page(document), encoding="utf-8")
-    return document, [out / name for name in ("fleet.parquet", "findings.parquet", "fleet.html")]
+    written = write_texts(out, {"fleet.html": page(document)})
+    return document, [out / "fleet.parquet", out / "findings.parquet", *written]
 
 
 def verdict(history: History) -> Verdict:

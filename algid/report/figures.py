@@ -7,9 +7,8 @@ damaged.
 from __future__ import annotations
 
 import cmath
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from algid.arm import FloatArray
 from algid.base.blocks import rows_of, stacked
 from algid.base.quantiles import median, quantile
 from algid.base.text import file_name, joined, significant, unit_text
-from algid.model import K1, K3, K5, SINES, length_by_coupling, moments_of
+from algid.model import SINES, length_by_coupling, moments_of
 from algid.options import flag
 from algid.report.plot import ArmDrawing, Panels, down
 from algid.report.series import POINTS, Drawn, drawn, table
@@ -36,7 +35,7 @@ def figures(folder: Path, result: Result, raw: Drawn | None) -> list[Panels]:
     if raw is not None:
         made = [torque(folder, result, raw), closeup(result, raw), *made]
         made += [signals(result, raw), coverage(raw)]
-    made += [correlation(result), information(folder), inertia(result, raw)]
+    made += [correlation(result), information(folder)]
     return [plot for plot in made if plot is not None]
 
 
@@ -209,32 +208,6 @@ def information(folder: Path) -> Panels | None:
     return shares_of_time(names, np.nan_to_num([rows[name] for name in names]), 1.0)
 
 
-def inertia(result: Result, raw: Drawn | None) -> Panels | None:
-    """M11, M12 and M22 over one turn of joint 2, with their 95 % bands."""
-    names = K1, K3, K5
-    several = [getattr(result.parameters.get(name), "estimate", None) for name in names]
-    k = np.array(several, dtype=np.float64)
-    if np.isnan(k).any():
-        return None
-    C = np.full((3, 3), np.nan) if result.fit is None else result.fit.covariance_of(names)
-    degrees = np.linspace(-180.0, 180.0, 181)
-    c, one = np.cos(np.radians(degrees)), np.ones(degrees.size)
-    # M is linear in k1, k3 and k5 (eq. (3)): these are its derivatives (entry, constant, n)
-    J = np.array([[2 * c, one, one], [c, one, 0 * c], [0 * c, one, 0 * c]])
-    m, variance = k @ J, (J * (C @ J)).sum(axis=1)
-    half = result.quantile * np.sqrt(np.maximum(variance, 0))
-    panels = Panels("inertia")
-    for name, value, wide in zip(("M11", "M12 = M21", "M22"), m, half, strict=True):
-        panels.band(0, degrees, value - wide, value + wide, "95 % interval")
-        panels.add(0, degrees, value, name)
-    if raw is not None:
-        reached = (np.degrees(raw["theta2"]) + 180.0) % 360.0 - 180.0
-        panels.mark(0, "reached", np.nanmin(reached), np.nanmax(reached))
-    smallest = np.linalg.eigvalsh(np.array([m[:2], m[1:]]).T).min()
-    panels.note = f"The smallest eigenvalue of M is {significant(float(smallest), 3)} kg m²."
-    return panels
-
-
 def intervals(result: Result) -> Panels:
     """Every estimate's 95 % interval in percent of the estimate, each log's own, and the truth."""
     known, shares = dict[str, float](), list[float]()
@@ -245,23 +218,18 @@ def intervals(result: Result) -> Panels:
     widest = min(max(shares, default=1.0), USUAL * median(shares or [1.0]), WIDEST)
     over = "95 % interval, % of the estimate"
     panels = down("intervals", over, list(known), 1.15 * max(widest, 1e-6))
-
-    def dots(pairs: Iterable[tuple[str, float | None]], name: str, **more: Any) -> None:
-        at = [(of, value) for of, value in pairs if of in known and value is not None]
-        x = [100 * (value - known[of]) / abs(known[of]) for of, value in at]
-        if at:
-            panels.add(0, x, [of for of, _ in at], name, **more)
-
     bars = {"type": "data", "array": shares, "thickness": 2.5, "width": 0}
-    dots(known.items(), "estimate with its interval", error_x=bars)
-    by_log = []
-    if result.fit is not None and len(result.fit.by_log) == len(result.logs) > 1:
-        for log, own in zip(result.logs, result.fit.by_log, strict=True):
-            # a loaded log's constants hold its payload's share
-            if log.role == "unloaded":
-                by_log += [(n, one.estimate) for n, one in own.items() if n in result.parameters]
-    dots(by_log, "each log by itself")
-    dots(known_truth(result).items(), "truth")
+    panels.add(0, [0.0] * len(known), list(known), "estimate with its interval", error_x=bars)
+    beside, logs = [("truth", known_truth(result))], result.logs
+    for log, own in zip(logs, result.fit.by_log if result.fit else (), strict=False):
+        if len(logs) > 1 and log.role == "unloaded":  # a loaded one's hold its payload's share
+            found = {name: one.estimate for name, one in own.items() if one.estimate is not None}
+            beside.insert(-1, ("each log by itself", found))
+    for name, found in beside:
+        names = [one for one in known if one in found]
+        x = [100 * (found[one] - known[one]) / abs(known[one]) for one in names]
+        if names:
+            panels.add(0, x, names, name)
     return panels
 
 

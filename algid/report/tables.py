@@ -22,7 +22,7 @@ from algid.base.text import (
     unit_text,
     yes_or_no,
 )
-from algid.notices import NAMED
+from algid.notices import NAMED, flat
 from algid.report.document import Table
 from algid.results import Estimate, FitSummary, LogSummary, Result, Status, TorquePrediction
 from algid.results.rows import known_truth, rows_of
@@ -169,10 +169,7 @@ def log_tables(logs: Sequence[LogSummary]) -> tuple[Table, Table]:
 
 def settings_table(settings: Mapping[str, Any]) -> Table:
     """The settings that are set by dotted name, less those of channels."""
-    rows = []
-    for name, text in flat_settings(settings).items():
-        if text != ABSENT and ".channels." not in name:
-            rows.append((name, text))
+    rows = [one for one in in_words(settings).items() if ".channels." not in one[0]]
     return Table("Settings", "Setting | Value", rows)
 
 
@@ -188,20 +185,16 @@ def settings_of(result: Result) -> dict[str, str]:
             every["used.Coulomb friction over"] = f"{significant(model.coulomb_speed, 2)} rad/s"
     if fit is not None and fit.torque_hold is not None:
         every["used.torque_hold"] = fit.torque_hold.used
-    return flat_settings(every)
+    return in_words(every)
 
 
-def flat_settings(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
-    """Settings by dotted name, each value as one reads it in a profile."""
-    flat: dict[str, str] = {}
-    for name, value in settings.items():
-        if isinstance(value, Mapping):
-            flat |= flat_settings(value, f"{prefix}{name}.")
-        elif value in (None, "", (), []):
-            flat[f"{prefix}{name}"] = ABSENT
-        else:
-            flat[f"{prefix}{name}"] = value if isinstance(value, str) else as_toml(value)
-    return flat
+def in_words(settings: Mapping[str, Any]) -> dict[str, str]:
+    """The settings that are set, by dotted name, each value as one reads it in a profile."""
+    words = {}
+    for name, value in flat(settings).items():
+        if value not in ("", (), []):
+            words[name] = value if isinstance(value, str) else as_toml(value)
+    return words
 
 
 def provenance_table(rows: Sequence[tuple[str, str]], logs: Sequence[LogSummary]) -> Table:

@@ -131,25 +131,23 @@ def print_table(table: Table, console: Console, *, failed: bool = False) -> None
         collapse_padding=True,
     )
     rows = [[visible(cell, LONGEST) for cell in row] for row in table.rows]
-    shown, room = list[tuple[int, str, Kind, int, int]](), console.width + 2
+    shown, room = list[tuple[int, Kind]](), console.width + 2
     for place, heading, kind in table.heads:
         cells = [heading, *(row[place] for row in rows)]
         words = cells if kind == "number" else " ".join(cells).split()
         least = max(min(cell_len(word), LONGEST_WORD) for word in words)
-        if shown and room < least + 2:
-            break
         room -= least + 2
-        shown.append((place, heading, kind, least, max(map(cell_len, cells)) - least))
-    # rich itself narrows the widest columns first, and cuts their digits
-    for _, heading, kind, least, more in shown:
-        more = min(more, max(room, 0))
-        room -= more
+        if shown and room < 0:
+            break
+        shown.append((place, kind))
         side: Literal["left", "right"] = "right" if kind == "number" else "left"
-        made.add_column(Text(heading), justify=side, overflow="fold", width=least + more)
+        # text gives way before numbers and words do
+        whole = max(map(cell_len, cells)) <= least
+        made.add_column(Text(heading), justify=side, overflow="fold", no_wrap=whole)
     styles = {"name": "bold", "status": "bold yellow"}
     for row in rows:
         line = []
-        for place, _, kind, *_ in shown:
+        for place, kind in shown:
             good = kind == "status" and row[place] == Status.OK and not failed
             line.append(Text(row[place], "green" if good else styles.get(kind, "")))
         made.add_row(*line)

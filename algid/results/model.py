@@ -25,6 +25,7 @@ from algid.model import DELAYS
 from algid.notices import Notice, Verdict, code_of_now, notes_of, warnings_of
 
 SCHEMA_VERSION: Literal[4] = 4
+Pair = tuple[float | None, float | None]
 
 
 class Status(StrEnum):
@@ -54,7 +55,7 @@ class Estimate(_Model):
 
     estimate: float | None
     std: float | None = None
-    ci95: tuple[float | None, float | None] | None = None
+    ci95: Pair | None = None
     unit: str
     status: Status = Status.OK
 
@@ -208,9 +209,9 @@ class TorquePrediction(_Model):
     filter: str
     bandwidth: float | None = None
     of_load: tuple[float, float] | None = None
-    rmse_moving: tuple[float | None, float | None] | None = None
-    rmse_rest: tuple[float | None, float | None] | None = None
-    rmse_held: tuple[float | None, float | None] | None = None
+    rmse_moving: Pair | None = None
+    rmse_rest: Pair | None = None
+    rmse_held: Pair | None = None
 
     @property
     def band(self) -> str:

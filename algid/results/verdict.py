@@ -29,7 +29,7 @@ from algid.notices import (
     of_codes,
     warnings_of,
 )
-from algid.options import SET, flag
+from algid.options import flag
 from algid.physics.parameters import BODY
 
 if TYPE_CHECKING:
@@ -253,35 +253,24 @@ def _command(result: Result, reasons: Sequence[Notice]) -> str | None:
     if remedy is None or "accept" in remedy.settings:  # to accept a cause mends nothing
         return None
     known = remedy.settings.items() <= (said | result.settings).items()
-    return None if known else again(result, remedy.flags)
+    return None if known else again(result, remedy)
 
 
-def again(result: Result, flags: Sequence[str]) -> str:
-    """The command that identifies again with `flags`, over the result that is there."""
+def again(result: Result, remedy: Remedy) -> str:
+    """The command that identifies again with `remedy`, over the result that is there."""
     from algid.settings import DEFAULTS, Settings
 
     made = result.settings.get("command")
-    if isinstance(made, str):
-        words = shlex.split(made)
-    else:  # what Python was asked for
+    if isinstance(made, str):  # of a flag that stands twice the last one counts
+        words = [*shlex.split(made), *remedy.flags]
+    else:  # what Python or a batch was asked for
         words, own = ["algid", "identify"], flat(result.profile)
         for log in result.logs:
             words += [flag("loaded"), log.path] if log.role == "loaded" else [log.path]
         for name, value in Settings.of(result.settings):
             if value != DEFAULTS[name] and name not in ("poles", *result.profile):
                 own[name] = value
-        words += Remedy(own).flags
-    # one that was typed otherwise before is no longer said
-    for typed, value in zip(flags[::2], flags[1::2], strict=True):
-        key = value.partition("=")[0] + "=" if typed == SET.strip() else ""
-        places = [
-            at
-            for at, word in enumerate(words[:-1])
-            if word == typed and words[at + 1].startswith(key)
-        ]
-        for at in reversed(places):
-            del words[at : at + 2]
-    words += flags
+        words += Remedy(own | {**remedy.settings}).flags
     if flag("force") not in words:
         words.append(flag("force"))
     return visible(shlex.join(words), LONGEST_COMMAND)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +12,11 @@ import pytest
 from algid.api.report import report
 from algid.base.errors import ResultError
 from algid.base.significance import NORMAL
-from algid.base.text import significant
 from algid.report.figures import (
     closeup,
     correlation,
     coverage,
     figures,
-    inertia,
     intervals,
     over_time,
     residual,
@@ -153,36 +150,6 @@ def test_maps_are_the_covariance_scaled_and_information_summed(result: Result) -
     np.testing.assert_allclose(typed(trace["z"]).sum(axis=1), 100, rtol=1e-5)
     assert typed(trace["z"])[0, 1] == pytest.approx(100 * (3 + 4 + 5) / gained[0].sum(), rel=1e-5)
     assert typed(trace["x"])[1] == pytest.approx(1.5 * 3 * 0.5)
-
-
-def test_the_mass_matrix_has_the_spread_of_draws(result: Result, raw: Drawn) -> None:
-    """M11 = k5 + k3 + 2 k1 cos θ2 of draws from the covariance."""
-    plot = inertia(result, raw)
-    assert plot is not None
-    fit, value = result.fit, result.parameters
-    assert fit is not None
-    k = np.array([value[name].estimate for name in ("k1", "k3", "k5")])
-    C = fit.covariance_of(("k1", "k3", "k5"))
-    draws = np.random.default_rng(1).multivariate_normal(k, C, 20_000)
-    (curve,), bands = traces(plot, "M11"), traces(plot, "95 % interval")
-    degrees, m11 = typed(curve["x"]), typed(curve["y"])
-    place = int(np.argmin(abs(degrees - 60)))
-    factors = np.array([2 * np.cos(np.radians(degrees[place])), 1, 1])
-    assert m11[place] == pytest.approx(float(factors @ k), rel=1e-6)
-    k1, k3, k5 = k
-    straight = [[k5 + k3 + 2 * k1, k3 + k1], [k3 + k1, k3]]  # where M is the closest to singular
-    smallest = float(np.linalg.eigvalsh(straight)[0])
-    assert f"M is {significant(smallest, 3)} kg" in plot.note
-    turned = np.degrees(raw["theta2"])
-    ends = pytest.approx((np.nanmin(turned), np.nanmax(turned)))
-    for turns in (0, 3):  # the axis is one turn
-        further = {"theta2": np.radians(turned + 360 * turns)}
-        shown = inertia(result, replace(raw, columns={**raw.columns, **further}))
-        assert shown is not None
-        (reached,) = shown.layout["shapes"]
-        assert (reached["x0"], reached["x1"]) == ends
-    half = typed(bands[0]["y"])[place] - m11[place]
-    assert half == pytest.approx(NORMAL * (draws @ factors).std(), rel=0.03)
 
 
 @pytest.mark.parametrize(

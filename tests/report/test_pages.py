@@ -35,7 +35,7 @@ from tests.report.pages import Page
 
 FIGURES = [
     "intervals", "torque", "closeup", "residual", "running", "signals", "coverage",
-    "correlation", "information", "inertia", "estimates", "loaded",
+    "correlation", "information", "estimates", "loaded",
 ]  # fmt: skip
 
 
@@ -190,7 +190,7 @@ def test_a_page_is_light(folder: Path) -> None:
 def test_a_bare_result_still_makes_a_page(tmp_path: Path, result: Result) -> None:
     bare = tmp_path / "bare.algid"
     shown = written(bare, result.model_copy(update={"fit": None, "more_logs": []}))
-    assert list(shown.figures) == ["inertia"]
+    assert shown.figures == {}
     assert 'class="first"' in shown.text  # nothing stands beside the numbers
     with pytest.raises(ResultError, match="cannot read it"):
         write_pages(tmp_path)

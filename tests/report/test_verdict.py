@@ -252,8 +252,8 @@ TYPED = "algid identify 'a b.csv' -o out"
         (HANGING, {"profile": {"zero": "hanging"}}, None),  # said already
         (
             HANGING,
-            {"settings": {"command": f"{TYPED} --zero upright --set tau1.sign=1"}},
-            f"{TYPED} --set tau1.sign=1 --zero hanging --force",
+            {"settings": {"command": f"{TYPED} --zero upright"}},
+            f"{TYPED} --zero upright --zero hanging --force",  # the last one counts
         ),
         (OTHERS, {}, None),
         (replace(HANGING, remedies=(Remedy({"accept": "WRONG_ZERO"}),)), {}, None),
