@@ -29,7 +29,7 @@ BUDGETS = {
 
 PARTS = {
     "input, output, batches": """readers writers batches log files stores staging
-    limits runtime faults compiled names ros2 arrow blocks guard""",
+    limits runtime faults compiled names ros2 arrow guard""",
     "core": """physics model arm signals estimators identification tracks designs synth
     significance quantiles criteria methods table4""",
 }

@@ -29,7 +29,6 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "text": room("errors"),
     "notices": room("options text"),
     "arm": room(packages="numpy", library=PURE),
-    "blocks": room(packages="numpy"),
     "arrow": room(packages="numpy pyarrow"),
     "compiled": room(packages="numpy scipy"),
     "quantiles": room("arm", "numpy"),
@@ -57,14 +56,14 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "table4": room("arm estimators limits log model names results synth"),
     "writers": room("arrow errors files log ros2", "mcap numpy polars pyarrow"),
     "readers": room(
-        "arm arrow blocks criteria errors faults files limits log notices options profile "
+        "arm arrow criteria errors faults files limits log names notices options profile "
         "quantiles ros2 runtime text units",
         "google h5py lz4 mcap numpy polars pyarrow rosbags ruamel scipy zstandard",
     ),
     "inspection": room("arm criteria errors estimators faults log model notices profile "
                        "quantiles readers signals units", "numpy pydantic_core"),
     "report": room(
-        "arm arrow blocks criteria errors files inspection methods model notices options "
+        "arm arrow criteria errors files inspection methods model names notices options "
         "progress quantiles results ros2 significance text",
         "jinja2 markupsafe mcap numpy plotly pyarrow pydantic_core rich"
     ),

@@ -67,16 +67,9 @@ def open_csv(path: Path, kind: str, names: Sequence[str] | None = None) -> Table
             source = source[: source.rfind(b"\n") + 1]
             notices = (Notice("CUT_OFF", numbers={"case": "cell"}),)
     if dialect.padded and isinstance(source, bytes):
-        mark = dialect.separator.encode() or b"\t"
-        if not dialect.separator:  # runs of blanks become one tab
-            source = source.replace(b" ", mark)
-        for blank in (b" ", b"\t"):
-            for edge in (mark, b"\r\n", b"\n"):
-                pairs = (blank + edge, edge + blank) if blank in source and edge in source else ()
-                for pair in pairs if blank.decode() != dialect.separator else ():
-                    while pair in source:
-                        source = source.replace(pair, edge)
-
+        mark = dialect.separator.encode() or None
+        rows = (line.split(mark) for line in source.split(b"\n"))
+        source = b"\n".join((mark or b"\t").join(map(bytes.strip, cells)) for cells in rows)
     return TableFile(
         str(path),
         "csv",

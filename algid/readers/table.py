@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.base.blocks import concatenated, rows_of
+from algid.base.names import concatenated, rows_of
 from algid.base.text import joined
 from algid.log import IntArray, Truth
 from algid.notices import Notice

@@ -26,8 +26,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from algid import __version__
-from algid.base.blocks import stacked
 from algid.base.files import whole_file
+from algid.base.names import stacked
 from algid.base.progress import Progress
 from algid.base.ros2 import HEADER, check_stamps
 from algid.report.series import facts_of, stretches

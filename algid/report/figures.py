@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.base.blocks import rows_of, stacked
+from algid.base.names import rows_of, stacked
 from algid.base.quantiles import median, quantile
 from algid.base.text import file_name, joined, significant, unit_text
 from algid.model import SINES, length_by_coupling, moments_of

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.base.arrow import numbers_of
-from algid.base.blocks import concatenated, rows_of
 from algid.base.criteria import CUT
 from algid.base.errors import ResultError
+from algid.base.names import concatenated, rows_of
 from algid.base.progress import Progress
 from algid.base.quantiles import median
 

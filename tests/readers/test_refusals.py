@@ -195,7 +195,9 @@ WRONG: dict[str, tuple[Callable[[Path], Path], dict[str, Any], str]] = {
         states(("/one",), ("a", "b")), {"theta1": {"source": "b", "topic": "/one"}},
         "--set theta1.source=NAME",
     ),
-    "a topic that is not there": (states(("/one",), ("a", "b")), {"tau1": TAKEN}, "--topic NAME"),
+    "a topic that is not there": (
+        states(("/one",), ("a", "b")), {"tau1": TAKEN}, "--set tau1.topic=NAME"
+    ),
     "joints that are not there": (
         states(("/one",), ("a", "b")), {"joints": ("c", "d")}, "--joints A,B"
     ),

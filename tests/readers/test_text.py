@@ -161,20 +161,6 @@ def test_names_with_control_characters_do_not_break_a_message(tmp_path: Path) ->
     assert "\u202e" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "header", ["t,theta1,theta2,tau1,tau2", '"t","theta1","theta2","tau1","tau2"']
-)
-@pytest.mark.parametrize("end", ["", "\n", "\n1,2,3,4,5\n"])
-def test_lines_that_end_in_carriage_returns_alone_are_refused(
-    header: str, end: str, tmp_path: Path
-) -> None:
-    (tmp_path / "log.csv").write_bytes(("\r".join([header, *ROWS[:30]]) + end).encode())
-    with pytest.raises(LogError, match="carriage returns alone"):
-        read_log(tmp_path / "log.csv")
-    (tmp_path / "log.csv").write_bytes(("\r\n".join([header, *ROWS[:30]]) + "\r\n").encode())
-    assert len(read_log(tmp_path / "log.csv")) == 30
-
-
 def test_a_row_that_lacks_a_value_has_no_time_to_be_counted_by(tmp_path: Path) -> None:
     rows = [line.partition(",")[2] for line in ROWS]
     rows[7] = rows[7].rpartition(",")[0] + ","

@@ -96,12 +96,15 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
     for home in dict.fromkeys(fields[one].topic for one in chosen.values()):
         paths = {name: one.column for name, one in fields.items() if one.topic == home}
         wanted = {name: fields[one].column for name, one in chosen.items() if one in paths}
-        layouts = list[MessageLayout]()
-        for layout in layouts_of(file, home):
-            layouts.append(layout)
-            if layout.has(wanted.values()) and stamp_in(layout):
-                break  # later messages tell nothing more
-        _refuse_absent(file, home, wanted, layouts)
+        layouts = layouts_of(file, home)
+        for channel, path in wanted.items():
+            if not any(layout.find(path) for layout in layouts):
+                known = [", ".join(list(one.numbers)[:12]) for one in layouts]
+                held = next(filter(None, known), file.listed())
+                setting = "topic" if home == profile.topic else f"{channel}.topic"
+                other = Remedy({setting: None, f"{channel}.source": None})
+                text = f"no message on {home!r} has {path!r} for {channel}; found {held}"
+                raise LogError(file.lacking(f"{text}; name another: {other}"))
         stamps[home] = None
         if profile.clock != "log":
             stamps[home] = next(filter(None, map(stamp_in, layouts)), None)
@@ -176,23 +179,6 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
     )
 
 
-def _refuse_absent(
-    file: MessageFile, topic: str, paths: Mapping[str, str], layouts: Sequence[MessageLayout]
-) -> None:
-    """Raises `LogError` where none of the first messages has one of the paths by channel."""
-    if not layouts:
-        each = Remedy({"tau1.topic": None}, "for one channel")
-        text = f"there is no message on topic {topic!r}; found {file.listed()}; name another"
-        raise LogError(file.lacking(f"{text}: {TOPIC}; {each}"))
-    for channel, path in paths.items():
-        if not any(layout.find(path) for layout in layouts):
-            known = next((list(one.numbers)[:12] for one in layouts if one.numbers), ["nothing"])
-            raise LogError(
-                f"{file.path}: messages on {topic!r} have no {path!r} for {channel}; found "
-                f"{', '.join(known)}; {Remedy({f'{channel}.source': None}, 'name another')}"
-            )
-
-
 def _stated_of(
     file: MessageFile, topic: str, paths: Mapping[str, str], layouts: Sequence[MessageLayout]
 ) -> tuple[dict[str, str], list[str]]:
@@ -222,9 +208,7 @@ def _references_of(file: MessageFile, joints: Sequence[str]) -> dict[str, TopicF
     for topic in file.topics:
         kind = file.channel(topic).type
         if topic == _JOINT_REFERENCES or kind.endswith("/JointTrajectoryControllerState"):
-            layout = MessageLayout()
-            with suppress(LogError):  # the log is read without it
-                layout = next(layouts_of(file, topic), layout)
+            layout = _first_layout(file, topic)
             names = names_in(layout)
             for positions in _REFERENCES:
                 paths = [f"{positions}[{names.index(one)}]" for one in joints if one in names]
@@ -260,11 +244,7 @@ def _find_joint_topic(
             continue
         why = held = ""
         try:
-            before: object = None
             for layout in layouts_of(file, name):
-                if (layout.numbers, layout.texts) == before:
-                    continue  # it tells nothing more
-                before = layout.numbers, layout.texts
                 try:
                     fields = fields_in(name, layout)
                     choice = _choice(fields, profile, given)
@@ -358,9 +338,7 @@ def stamp_in(layout: MessageLayout) -> tuple[str, str] | None:
 
 def fields_shown(file: MessageFile, number: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Joints in a channel's first message, and its numbers' paths as a profile writes them."""
-    layout = MessageLayout()
-    with suppress(LogError):
-        layout = next(layouts_of(file, file.channels[number].topic), layout)
+    layout = _first_layout(file, file.channels[number].topic)
     joints = names_in(layout)
     return joints, tuple(_paths(layout, joints))
 
@@ -378,33 +356,43 @@ def _paths(layout: MessageLayout, joints: Sequence[str]) -> Iterator[str]:
             yield f"{name}[{place}]"
 
 
-def layouts_of(file: MessageFile, topic: str) -> Iterator[MessageLayout]:
-    """Layouts of the topic's first messages that fit their schema.
+def _first_layout(file: MessageFile, topic: str) -> MessageLayout:
+    """The first layout of a topic's messages, an empty one where there is none."""
+    with suppress(LogError):
+        return next(iter(layouts_of(file, topic)), MessageLayout())
+    return MessageLayout()
+
+
+def layouts_of(file: MessageFile, topic: str) -> list[MessageLayout]:
+    """Layouts of the topic's first messages that fit their schema, each unlike the one before.
 
     Raises
     ------
     LogError
         If none of them does.
     """
+    layouts = list[MessageLayout]()
     if topic not in file.topics:
-        return
-    codec = codec_for(file.path, file.channel(topic))
+        return layouts
+    codec, misfit = codec_for(file.path, file.channel(topic)), None
     for messages in file.batches(file.topics[topic]):
         if isinstance(messages, str):
             file.damage.append(messages)
             continue
         records = codec.records(messages.take(slice(_SAMPLES)))
-        misfits = []
         for start, size in zip(records.starts, records.sizes, strict=True):
             end = start + min(size, LIMITS.message_bytes)
             try:
                 layout = codec.parse(records.content[start:end].tobytes())
             except MisfitError as error:
-                misfits.append(error)
+                misfit = error
                 continue
-            yield layout
-        if misfits and len(misfits) == len(records):
-            why = f"{misfits[-1]}; it cannot be read"
-            raise LogError(f"{file.path}: topic {topic!r}: {why}") from misfits[-1]
-        if len(records):
-            return
+            before = layouts[-1] if layouts else None
+            if before is None or (before.numbers, before.texts) != (layout.numbers, layout.texts):
+                layouts.append(layout)
+        if misfit and not layouts:
+            why = f"{misfit}; it cannot be read"
+            raise LogError(f"{file.path}: topic {topic!r}: {why}") from misfit
+        if layouts:
+            break
+    return layouts
