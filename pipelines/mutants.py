@@ -17,7 +17,7 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -52,7 +52,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "profile": (*FRONT, "inspection/test_commands.py"),
     "readers": ("readers",),
     "report": ("report", "test_verbs.py"),
-    "results": ("report", "fleet", "identification/test_outcome.py", "test_check.py", *FRONT),
+    "results": ("report", "identification/test_outcome.py", "test_check.py", "test_api.py"),
     "settings": FRONT,
     "signals": ("signals", *GOLDEN),
     "synth": ("synth", "cli/test_ends.py"),
@@ -62,6 +62,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
 USUAL = ("arm", "model", "estimators", "signals", "tracks", "fleet", "inspection")
 COPIED = ("algid", "tests", "pipelines", "data", "README.md", "CHANGELOG.md", "LICENSE",
     "constraints.txt", "pyproject.toml")  # fmt: skip
+TRIAL = (sys.executable, "-m", "pipelines.mutants_trial")
 BUDGET = 20.0  # s of tests for a mutant
 LIMIT = 4  # times as much processor time as its tests took: a mutant that takes more never ends
 
@@ -151,7 +152,27 @@ def chosen(mutant: Mutant, seconds: dict[str, float], lines: dict[str, list[str]
     return kept
 
 
-def tried(folder: Path, drawn: list[Mutant], room: str) -> Iterator[tuple[Mutant, str]]:
+def recorded(folder: Path, rooms: Sequence[str]) -> dict[str, Any]:
+    """The seconds of each test of the rooms, and the tests that reach each line of their files.
+
+    Raises
+    ------
+    SystemExit
+        Where the tests fail without a mutant.
+    """
+    tests = {test for room in rooms for test in tests_of(room)}
+    sources = [str(path) for room in rooms for path in files(room)]
+    asked = json.dumps({"tests": sorted(tests), "sources": sources})
+    done = subprocess.run([*TRIAL, asked], cwd=folder, capture_output=True, text=True)
+    if done.returncode:
+        raise SystemExit(done.stdout[-3000:] + done.stderr[-1000:])
+    known: dict[str, Any] = json.loads((folder / "reached.json").read_text(encoding="utf-8"))
+    return known
+
+
+def tried(
+    folder: Path, drawn: list[Mutant], seconds: dict[str, float], lines: dict[str, Any]
+) -> Iterator[tuple[Mutant, str]]:
     """Each mutant with its end as soon as that is known.
 
     Raises
@@ -159,24 +180,16 @@ def tried(folder: Path, drawn: list[Mutant], room: str) -> Iterator[tuple[Mutant
     SystemExit
         Where the tests fail without a mutant, or the trial breaks off.
     """
-    trial = [sys.executable, "-m", "pipelines.mutants_trial"]
-    asked = {"tests": tests_of(room), "sources": [str(path) for path in files(room)]}
-    recorded = subprocess.run(
-        [*trial, json.dumps(asked)], cwd=folder, capture_output=True, text=True
-    )
-    if recorded.returncode:
-        raise SystemExit(recorded.stdout[-3000:] + recorded.stderr[-1000:])
-    known: dict[str, Any] = json.loads((folder / "reached.json").read_text(encoding="utf-8"))
     by_name = {mutant.name: mutant for mutant in drawn}
     with (folder / "jobs").open("w", encoding="utf-8") as jobs:
         for mutant in drawn:
-            tests = chosen(mutant, known["seconds"], known["lines"].get(str(mutant.path), {}))
+            tests = chosen(mutant, seconds, lines.get(str(mutant.path), {}))
             job = {
                 "name": mutant.name,
                 "path": str(mutant.path),
                 "text": mutant.text,
                 "tests": tests,
-                "limit": round(20 + LIMIT * sum(known["seconds"][test] for test in tests)),
+                "limit": round(20 + LIMIT * sum(seconds[test] for test in tests)),
             }
             if mutant is drawn[0]:  # the same tests without a change
                 text = mutant.module.code
@@ -184,7 +197,7 @@ def tried(folder: Path, drawn: list[Mutant], room: str) -> Iterator[tuple[Mutant
             jobs.write(json.dumps(job) + "\n")
     with (folder / "jobs").open() as stdin:
         running = subprocess.Popen(
-            trial, cwd=folder, stdin=stdin, stdout=subprocess.PIPE, text=True
+            TRIAL, cwd=folder, stdin=stdin, stdout=subprocess.PIPE, text=True
         )
         for line in running.stdout or ():
             name, end = line.split()
@@ -212,13 +225,16 @@ def main() -> None:
     for name in COPIED:
         source = Path(name)
         (shutil.copytree if source.is_dir() else shutil.copy)(source, options.folder / name)
-    below = False
+    below, known = False, recorded(options.folder, options.rooms)
     for room in options.rooms:
         every = [mutant for path in files(room) for mutant in mutants(path)]
         drawn = random.Random(options.seed).sample(every, min(options.count, len(every)))
-        drawn = [mutant for mutant in drawn if not options.only or mutant.name in options.only]
+        if options.only:
+            drawn = [mutant for mutant in every if mutant.name in options.only]
         ends: Counter[str] = Counter()
-        for mutant, end in tried(options.folder, drawn, room):
+        own = tuple(tests_of(room))
+        seconds = {test: took for test, took in known["seconds"].items() if test.startswith(own)}
+        for mutant, end in tried(options.folder, drawn, seconds, known["lines"]):
             ends[end] += 1
             print(f"{ends.total()} of {len(drawn)}", end="\r", file=sys.stderr, flush=True)
             if end != "killed":

@@ -63,7 +63,7 @@ def record(tests: list[str], sources: list[str]) -> None:
     """Write ``reached.json``: seconds by test, and tests by line of the sources."""
     from coverage import Coverage
 
-    coverage = Coverage(data_file=None, include=sources)
+    coverage = Coverage(data_file=None, config_file=False, include=sources)  # not of processes
     recorder = Recorder(coverage)
     coverage.start()
     code = pytest.main([*PYTEST, *tests], plugins=[recorder])

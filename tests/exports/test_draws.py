@@ -55,7 +55,14 @@ def drawn(
 def test_draws_are_students_with_the_estimates_covariance() -> None:
     result, count = correlated(std=1e-3), 3000
     manifest, files = drawn(result, "parquet", count, 1)
-    said = {"result": "arm", "estimator": "refined", "seed": 1, "refused": 0, "known": {}}
+    said = {
+        "algid": algid.__version__,
+        "result": "arm",
+        "estimator": "refined",
+        "seed": 1,
+        "refused": 0,
+        "known": {},
+    }
     assert manifest | said | {"distribution": "Student's t", "from_prior": []} == manifest
     assert manifest["degrees_of_freedom"] == pytest.approx(NU, rel=1e-6)
     assert drawn(result_of(VALUE, FRICTION), "csv", 1, 0)[0]["degrees_of_freedom"] == 1e10

@@ -136,6 +136,9 @@ def test_a_given_length_moves_the_constants_as_their_covariance_says() -> None:
     assert found.half["k1"] == pytest.approx(found.half["k2"] * l1 / g, rel=1e-9)
     assert found.half["k2"] == pytest.approx(NORMAL / math.sqrt(line @ line), rel=1e-9)
     assert found.value["k3"] == arm.constants()[2]
+    # without error bars both moments are equally wrong
+    bare = describe(result.model_copy(update={"fit": None}), "arm", {"l1": l1}, links=False)
+    assert bare.value["k1"] / c[0] + bare.value["k2"] / c[1] == pytest.approx(2, abs=1e-4)
 
 
 ARM = result_of(values_of(ODD))
@@ -171,7 +174,7 @@ POINT = {"l1": 0.4, "l2": 0.3}
             "payload",
             result_of(values_of(ODD), payload={"m_p": -0.2} | POINT),
             {},
-            "no load explains a payload of -0.2 kg",
+            "payload of -0.2 kg; check which log is the loaded one$",
         ),
         (
             "urdf",

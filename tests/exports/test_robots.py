@@ -86,6 +86,7 @@ def test_the_header_says_where_each_number_comes_from() -> None:
         result.model_copy(update={"parameters": more}), "result.json", "urdf", {"rotor1": 0.01}
     )
     assert 'robot name="arm"' in text
+    assert '<origin xyz="0.3 0.0 0.0"/>' in text  # the tip
     assert origins(text) == {
         "k1": "identified, ± 0.00043 (95 %), conditioned on l1",
         "k3": "from the prior, not measured, ± 0.00028 (95 %), conditioned on l1",
