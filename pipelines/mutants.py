@@ -31,7 +31,10 @@ from mutmut.mutation.pragma_handling import IgnoredCode
 FRONT = ("cli", "test_api.py", "test_verbs.py")
 GOLDEN = ("golden",)
 ROOMS: dict[str, tuple[str, ...]] = {
-    "api": FRONT,
+    "api": (
+        *FRONT, "test_example.py", "fleet/test_command.py", "identification/test_validate.py",
+        "inspection/test_commands.py",
+    ),
     "arm": ("test_arm.py", *GOLDEN),
     "base": (
         "test_arrow.py", "test_compiled.py", "test_credentials.py", "test_quantiles.py",
@@ -52,7 +55,8 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "profile": (*FRONT, "inspection/test_commands.py"),
     "readers": ("readers",),
     "report": ("report", "test_verbs.py"),
-    "results": ("report", "identification/test_outcome.py", "test_check.py", "test_api.py"),
+    "results": ("report", "identification/test_outcome.py", "test_check.py", "test_api.py",
+        "test_tampered.py"),
     "settings": FRONT,
     "signals": ("signals", *GOLDEN),
     "synth": ("synth", "cli/test_ends.py"),
@@ -141,7 +145,7 @@ def chosen(mutant: Mutant, seconds: dict[str, float], lines: dict[str, list[str]
     reach = {test for line in mutant.lines for test in lines.get(str(line), ())}
     beside = {test.partition("::")[0] for test in reach}
     kept: list[str] = []
-    spent = 0.0
+    spent = 0.0 if reach else 0.75 * BUDGET
     for test in sorted(
         seconds, key=lambda t: (t not in reach, t.partition("::")[0] not in beside, seconds[t])
     ):

@@ -175,7 +175,8 @@ def test_a_log_is_made_of_arrays_either_way_round_and_gives_the_same_result() ->
         algid.Log.from_arrays(log.t[::-1], log.theta, log.tau)
     frame = one.to_frame()
     assert frame["parameter"].to_list() == list(one.estimates)
-    assert frame["std"][0] == one.parameters["k1"].std
+    k1 = one.parameters["k1"]
+    assert frame.row(0) == ("k1", k1.estimate, k1.std, *(k1.ci95 or ()), "kg m^2", "OK")
     assert one.covariance.shape == (len(one.fit.covariance_names),) * 2 if one.fit else False
     assert one.verdict.word in repr(one)
 

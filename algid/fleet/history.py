@@ -78,8 +78,8 @@ class History:
     findings: pl.DataFrame
     roster: pl.DataFrame
     jobs: pl.DataFrame
-    nameless: int = 0
-    failed: int = 0
+    nameless: int
+    failed: int
 
     @property
     def untested(self) -> list[Notice]:

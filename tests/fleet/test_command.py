@@ -86,12 +86,9 @@ def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     assert "2 robots, 20 logs: 1 drift and 1 payload" in done.stdout
     assert "1 payload unlike the label: m_p of r0/0" in " ".join(done.stdout.split())
-    assert "wrote" in done.stderr
-    assert {path.name for path in (tmp_path / "page").iterdir()} == {
-        "fleet.parquet",
-        "findings.parquet",
-        "fleet.html",
-    }
+    written = sorted((tmp_path / "page").iterdir())
+    assert [one.name for one in written] == ["findings.parquet", "fleet.html", "fleet.parquet"]
+    assert sorted(done.stderr.splitlines()) == [f"wrote {one}" for one in written]
     assert pl.read_parquet(tmp_path / "page/fleet.parquet").height == 4
 
 
@@ -123,6 +120,8 @@ def test_the_page_is_two_tables_and_a_figure(tmp_path: Path) -> None:
     page = Page((tmp_path / "page/fleet.html").read_text(encoding="utf-8"))
     assert list(page.tables) == ["Findings", "Robots"]
     assert list(page.figures) == ["logs"]
+    assert {"numbers", "logs", "robots"} <= {own.get("id") for _, own in page.tags}
+    assert "<h1>Fleet</h1>" in page.text
 
 
 def test_a_name_that_attacks_is_text(tmp_path: Path) -> None:

@@ -267,7 +267,10 @@ def test_a_step_is_what_two_means_explain_once_in_a_million_lives(
     step = 10.0 * math.sqrt(share * gain / 5)
     jobs = table([100.0] * 10 + [100.0 + step] * 10, 10.0)
     undated = table([120.0] * 3, 10.0, time=pl.Series([None] * 3, dtype=STAMP), job=["a", "b", "c"])
-    found = history_in(tmp_path, pl.concat([jobs, undated])).findings.filter(kind="step")
+    history = history_in(tmp_path, pl.concat([jobs, undated]))
+    assert history.jobs["job"][0] == "j19"
+    assert history.jobs["time"].tail(3).null_count() == 3
+    found = history.findings.filter(kind="step")
     assert found.height == told
     if told:
         assert found.select("job", "expected").row(0) == ("j10", pytest.approx(100.0))
@@ -382,7 +385,8 @@ def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: P
     value, half = (
         significant(100 * step[n] / step["expected"], 2 + (n == "value")) for n in ("value", "half")
     )
-    assert row[1:5] == ("r1", "k1", "step", f"{value} ± {half} %")
+    distance = significant(step["sigmas"], 2)
+    assert row[1:6] == ("r1", "k1", "step", f"{value} ± {half} %", distance)
     assert row[6] == "2026-03-21 to 2026-03-22"
     assert [row[3] for row in robot_table(history).rows] == ["none", "2"]
     assert verdict(history).headline == "2 robots, 240 logs: 2 steps"

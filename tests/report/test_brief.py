@@ -24,8 +24,12 @@ def shown(result: Result) -> str:
 def test_verdict_reasons_estimates_and_fit_are_shown(result: Result) -> None:
     text = shown(result)
     assert text.startswith("Good: ")
-    for words in ("gravity moment of link 2", "k7", "m_p", "R²"):
+    for words in ("gravity moment of link 2", "k7", "m_p"):
         assert words in text
+    found = result.fit.residual.model_copy(update={"r2": (0.5, 0.99991), "bandwidth": 60.0})
+    fit = result.fit.model_copy(update={"residual": found, "cross_validation": None})
+    line = "R² of the torque below 60 Hz: joint 1 50.00 %, joint 2 over 99.99 %"
+    assert line in brief(result.model_copy(update={"fit": fit}))
     codes = ("ONE", "TWO", "THREE", "FOUR")
     noted = [Notice(code, "said " * 90, logs=(f"{code}.csv",)) for code in codes]
     noted.append(Notice("FIVE", "five", note=True))

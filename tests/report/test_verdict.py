@@ -204,7 +204,7 @@ CASES = {
     ),
     "causes by their order": Case(
         lambda r: implausible(noticed(r, HANGING, OTHERS)),
-        "failed", ["OTHER_JOINTS", "WRONG_ZERO"], "other joints of the arm move",
+        "failed", ["OTHER_JOINTS", "WRONG_ZERO"], "Failed: other joints of the arm move; do",
     ),
     "of the fit before of a log": Case(
         lambda r: of(noticed(r, UNEVEN, APART, REFUTED), LOST, "k5"),
