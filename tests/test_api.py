@@ -66,6 +66,7 @@ def test_a_result_is_read_by_a_string_and_shows_itself_as_a_short_table(tmp_path
     made = build(tmp_path / "a.algid", duration=1.0)
     found = algid.read_result(str(tmp_path / "a.algid"))
     assert found == made
+    assert found != made.model_copy(update={"estimator": "weak"})
     lines = str(found).splitlines()
     assert lines == repr(found).splitlines()
     assert lines[0].startswith("refined estimate from")

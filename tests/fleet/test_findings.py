@@ -21,7 +21,7 @@ from algid.base.significance import CERTAIN
 from algid.base.text import significant
 from algid.fleet.history import History, history_of
 from algid.fleet.page import finding_table, overview, robot_table, verdict
-from tests.report.pages import named
+from tests.report.pages import named, typed
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 MONTH = 30.4375  # days
@@ -114,16 +114,20 @@ def test_estimates_without_an_error_bar_count_for_nothing(tmp_path: Path) -> Non
         k1_std=pl.when(pl.col("job") == "j10").then(None).otherwise(pl.col("k1_std"))
     )
     for one in (jobs.head(10), nothing):
-        found = history_in(tmp_path, one).windows.filter(parameter="k1").rows(named=True)[-1]
+        history = history_in(tmp_path, one)
+        (points,) = named(overview(history).data, "log")
+        assert np.isfinite(typed(points["y"])).sum() == 8
+        found = history.windows.filter(parameter="k1").rows(named=True)[-1]
         assert found["logs"] == 8
         assert found["mean"] == pytest.approx(np.mean(good), rel=1e-12)
 
 
 def test_what_is_not_finished_is_not_read(tmp_path: Path) -> None:
-    found = history_in(
-        tmp_path, table([1.0, 2.0, 3.0], status=["ok", "failed", "incomplete"])
-    ).jobs.reverse()
+    status, labels = ["ok", "failed", "incomplete"], ["heavy", "1", "0.5"]
+    jobs = table([1.0, 2.0, 3.0], status=status, label_payload=labels)
+    found = history_in(tmp_path, jobs).jobs.reverse()
     assert found["job"].to_list() == ["j0", "j2"]
+    assert found["label_payload"].to_list() == [None, 0.5]
     assert found["month"].to_list() == [0, 0]
     assert found["t"].to_numpy() == pytest.approx([0, 2 / MONTH], rel=1e-12)
 
@@ -275,6 +279,9 @@ def test_a_step_is_what_two_means_explain_once_in_a_million_lives(
     if told:
         assert found.select("job", "expected").row(0) == ("j10", pytest.approx(100.0))
         assert found["value"][0] == pytest.approx(step, rel=1e-9)
+        jobs = table([100.0] * 10 + [100.0 + 6 * step] * 10 + [100.0 + 3 * step] * 10, 10.0)
+        found = history_in(tmp_path, jobs).findings.filter(kind="step").sort("time")
+        assert found["job"].to_list() == ["j10", "j20"]
 
 
 def fleet(
@@ -380,7 +387,9 @@ def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: P
     assert [one.text for one in verdict(history).reasons] == [
         "2 parameters changed at once: k1 of r1 and k3 of r1"
     ]
-    (row,) = [row for row in finding_table(history).rows if row[2] == "k1"]
+    shown = finding_table(history)
+    assert "p < 9e-4; a step" in shown.note
+    (row,) = [row for row in shown.rows if row[2] == "k1"]
     step = found.filter(parameter="k1").row(0, named=True)
     value, half = (
         significant(100 * step[n] / step["expected"], 2 + (n == "value")) for n in ("value", "half")
