@@ -47,7 +47,7 @@ def read_jobs(path: Path) -> pl.DataFrame:
         number, most = pl.col(wanted).cast(pl.Float64, strict=False), LIMITS.largest_value
         age = pl.col("time") - pl.col("time").min().over("robot")
         t = age.dt.total_seconds() / (86400 * MONTH_DAYS)
-        jobs = jobs.with_columns(pl.col("time").cast(pl.Datetime("us", "UTC")), **none).select(
+        jobs = jobs.with_columns(**none).select(
             pl.col("job", "robot", "status").cast(pl.String),
             "time",
             pl.when(number.abs().is_between(1 / most, most) | (number == 0)).then(number),

@@ -118,7 +118,10 @@ class Case:
 CASES = {
     "sound": Case(lambda r: r, "good", [], "all 9 parameters are identified"),
     "a payload's inertia": Case(lambda r: of(r, VAGUE, "J_p"), "good", [], "9 of 10"),
-    "one lost": Case(lambda r: of(r, LOST, "k5"), codes=["NOT_IDENTIFIABLE"], words="8 of 9 parameters are identified, but "),
+    "one lost": Case(
+        lambda r: of(r, LOST, "k5"),
+        codes=["NOT_IDENTIFIABLE"], words="8 of 9 parameters are identified, but",
+    ),
     "half lost": Case(
         lambda r: of(r, LOST, *NAMES[:4]),
         codes=["NOT_IDENTIFIABLE"], words="record a run in which both joints move",
