@@ -19,7 +19,7 @@ from importlib import resources
 from itertools import groupby
 from typing import Any, Literal
 
-from algid.base.text import as_toml, counted, joined
+from algid.base.text import as_toml, joined
 from algid.options import FLAGS, SET, VALUES, flag
 
 
@@ -55,51 +55,29 @@ class Remedy:
         return tuple(words)
 
     @property
-    def keywords(self) -> dict[str, Any]:
-        """As Python's keywords, a channel's settings in a dictionary of their own."""
-        keywords: dict[str, Any] = {}
-        for name, value in self.settings.items():
-            channel, dot, key = name.partition(".")
-            if dot:
-                keywords.setdefault(channel, {})[key] = value
-            else:
-                keywords[name] = value
-        return keywords
-
-    @property
     def words(self) -> str:
         """Its flags as a shell takes them."""
-        # what stands in plain quotation marks stays as it reads best
-        return " ".join(
-            word if _IN_MARKS.fullmatch(word) else shlex.quote(word) for word in self.flags
-        )
+        return shlex.join(self.flags)
 
     def __str__(self) -> str:
         """As messages name it."""
         return f"{self.when}: {self.words}" if self.when else self.words
 
 
-_IN_MARKS = re.compile(r'[\w.]+="[\w ]+"')
-
-
 class _Words(string.Formatter):
-    """Format strings: ``{count:# sample has|samples have}`` takes its number, lists are joined."""
+    """Format strings: of ``{count:# sample has|# samples have}`` one is taken, lists are joined."""
 
     def format_field(self, value: Any, spec: str) -> str:
         """One value as `spec` has it; behind ``~``, # is the value, empty for 0, None or empty."""
-        several = isinstance(value, list | tuple)
-        if spec[:1] == "~":
-            if not value or "|" not in spec:
-                return spec[1:].replace("#", str(value)) if value else ""
-            spec = spec[1:]
-        if "|" in spec:
-            shown, _, words = spec.rpartition("# ")
-            one, many = words.split("|")
+        several, optional, form = isinstance(value, list | tuple), spec[:1] == "~", spec.lstrip("~")
+        if optional and not value:
+            return ""
+        if "|" in form:
             count = len(value) if several else value
-            return (
-                shown + counted(count, one, many) if words != spec else one if count == 1 else many
-            )
-        return joined(list(map(str, value))) if several else str(format(value, spec))
+            return form.split("|")[count != 1].replace("#", f"{count:,}")
+        if optional:
+            return form.replace("#", str(value))
+        return joined(list(map(str, value))) if several else str(format(value, form))
 
 
 @cache
@@ -216,7 +194,7 @@ class Notice:
     @property
     def sentence(self) -> str:
         """Logs, text and advice in one clause."""
-        return f"{_place(self.logs)}{self.clause}"
+        return ": ".join(filter(None, (joined(self.logs, NAMED), self.clause)))
 
     @property
     def clause(self) -> str:
@@ -230,15 +208,8 @@ class Notice:
         return replace(self, logs=logs)
 
 
-NAMED = 3  # logs that are named
-
-
-def _place(logs: Sequence[str]) -> str:
-    if not logs:
-        return ""
-    if len(logs) <= NAMED:
-        return f"{', '.join(logs)}: "
-    return f"{joined(logs, 1)}: "
+NAMED = 3
+"""Logs of a notice that are named, before how many more there are."""
 
 
 def merged(notices: Iterable[Notice]) -> list[Notice]:

@@ -300,7 +300,7 @@ class Profile(_Strict):
 
 
 def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
-    """The profile with settings over it, channel by channel.
+    """The profile with settings over it, channel by channel; ``tau1.sign`` is a name too.
 
     Raises
     ------
@@ -308,7 +308,10 @@ def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
         If a setting or its value is not known.
     """
     merged = profile.model_dump(exclude_unset=True)
-    for name, value in settings.items():
+    for given, value in settings.items():
+        name, dot, key = given.partition(".")
+        if dot:
+            value = {key: value}
         if isinstance(value, Mapping):  # settings of one channel
             value = merged.get(name, {}) | dict(value)
         for channel in CHANNELS_OF.get(name, ()):
@@ -319,8 +322,7 @@ def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
     except ValidationError as error:
         place, why = misfit(error)
         name = place.partition(".")[0]
-        of_channel = isinstance(settings.get(name), Mapping)
-        raise SettingError(f"{flag(place if of_channel else name)}: {why}") from error
+        raise SettingError(f"{flag(place if name in ALL_CHANNELS else name)}: {why}") from error
 
 
 def lasting(stated: Mapping[str, Any]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
 from algid.base.limits import LIMITS
 from algid.base.names import within
-from algid.estimators.paper import STAGE1_NAMES
+from algid.estimators.paper import STAGE1_NAMES, STAGE2_NAMES
 from algid.log import Truth
 from algid.model import UNITS as PARAMETER_UNITS
 from algid.results import Estimate, Table4Row
@@ -21,7 +21,7 @@ def _summing(*rows: str) -> Rows:
 
 
 UNLOADED_ROWS = _summing(*STAGE1_NAMES)
-LOADED_ROWS = _summing("k5+k3+z1+z2", "k1+z3", "k3+z2", "k4+z4", "k2+z5")
+LOADED_ROWS = _summing(*STAGE2_NAMES)
 UNITS = {
     row: PARAMETER_UNITS[row.partition("+")[0]] for row in (*UNLOADED_ROWS, *LOADED_ROWS, "m_p")
 }
@@ -52,30 +52,27 @@ def table4(
     The truth is that of the arm behind a synthetic log and of the loaded log's `payload` in kg. The
     paper's errors are those of its cases, where the log comes from one unchanged.
     """
-    true, paper = dict[str, float](), dict[str, float]()
+    true, paper = true_parameters(truth, payload), dict[str, float]()
     if truth is not None:
         from algid.synth.cases import case_names, load_case
 
         k = truth.arm.constants()
-        true = sums(UNLOADED_ROWS, k)
+        true |= sums(UNLOADED_ROWS, k)
         if payload:
-            loaded = with_payload(k, truth.arm.payload_constants(payload))
-            true |= sums(LOADED_ROWS, loaded) | {"m_p": payload}
-        case = load_case(truth.case) if truth.case in case_names() else None
-        if case is not None and case.arm == truth.arm:
+            true |= sums(LOADED_ROWS, with_payload(k, truth.arm.payload_constants(payload)))
+        if truth.case in case_names() and (case := load_case(truth.case)).arm == truth.arm:
             paper = case.paper_error_percent
     rows = []
     for name, unit in UNITS.items():
         own, known = estimates.get(name, Estimate(estimate=None, unit=unit)), true.get(name)
-        estimate = own.estimate
         row = Table4Row(
             parameter=name,
             unit=unit,
-            estimate=estimate,
+            estimate=own.estimate,
             std=own.std,
             truth=known,
-            error_percent=100 * abs(estimate / known - 1)
-            if known and estimate is not None
+            error_percent=100 * abs(own.estimate / known - 1)
+            if known and own.estimate is not None
             else None,
             paper_error_percent=paper.get(name),
         )

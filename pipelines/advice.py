@@ -30,8 +30,8 @@ import numpy as np
 import polars as pl
 
 from algid.arm import CONSTANT_NAMES, FloatArray
-from algid.base.errors import AlgidError, Exit
-from algid.cli.app import called
+from algid.base.errors import Exit
+from algid.cli.app import run as run_command
 from algid.model import RIGID
 from algid.results import Result, read_result
 from algid.results.verdict import CAUSES, again
@@ -140,10 +140,7 @@ def run(words: list[str], folder: Path) -> Outcome:
         contextlib.redirect_stderr(printed),
     ):
         try:
-            code = called(words[1:])
-        except AlgidError as error:
-            print(error)
-            code = Exit.USAGE
+            code = run_command(words[1:])
         except SystemExit as end:
             code = int(end.code or 0)
     found = next(iter(folder.glob("*.algid/result.json")), None)

@@ -58,7 +58,7 @@ def draw(effort: str, name: str, seed: int) -> Seen:
     seen["named"] = [1] * bool(named)
     seen["other"] = [*{one.code for one in result.notices if one.remedies} - {NAMES[effort]}]
     if named and named[0].remedy is not None:
-        result = identify(unloaded, burdened, report=False, **named[0].remedy.keywords)
+        result = identify(unloaded, burdened, report=False, **named[0].remedy.settings)
     then = judged(result, {"m_p": float(payload[0])})
     return seen | {"held": then["held"], "then 0": then["exit 0"]}
 

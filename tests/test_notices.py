@@ -50,7 +50,7 @@ def flags_as_given(remedy: Remedy) -> dict[str, object]:
 def test_flags_and_keywords_of_a_remedy_mean_the_same(remedy: Remedy) -> None:
     by_flags = profile_from(flags_as_given(remedy))
     if "angle_unit" not in remedy.settings:
-        by_keywords = with_settings(Profile(), remedy.keywords)
+        by_keywords = with_settings(Profile(), remedy.settings)
         assert by_keywords.model_dump() == by_flags.model_dump()
 
 
@@ -82,6 +82,8 @@ def test_every_entry_is_whole() -> None:
     for one in messages():
         assert not by_set & set(re.findall(r"--[a-z][a-z0-9-]+", str(one))), one
         assert one["cause"], one
+        for forms in re.findall(r":~?([^{}]*[|][^{}]*)}", str(one)):  # of one, and of several
+            assert len({form.count("#") for form in forms.split("|")}) == 1, forms
         for cases in (one["note"], one["lossy"]):
             assert isinstance(cases, bool) or set(cases) <= set(one["text"]), one
 
@@ -96,7 +98,7 @@ def test_equal_notices_of_several_logs_become_one_and_each_loss_stays() -> None:
     found = merged([*jitter, *lost])
     assert [one.code for one in found] == ["UNEVEN_STAMPS", "NOT_FINITE", "NOT_FINITE"]
     assert found[0].logs == ("0.csv", "1.csv", "2.csv", "3.csv", "4.csv")
-    assert found[0].sentence == "0.csv and 4 more: by 0 ms"
+    assert found[0].sentence == "0.csv, 1.csv, 2.csv and 2 more: by 0 ms"
 
 
 def test_a_notice_is_plain_data() -> None:

@@ -16,7 +16,6 @@ from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import cache, wraps
-from itertools import chain
 from pathlib import Path
 from typing import (
     TYPE_CHECKING,
@@ -142,49 +141,50 @@ def options_of(taker: Callable[..., Any], of: str = "") -> Mapping[str, Option]:
     module = vars(sys.modules[taker.__module__])
     names = ChainMap(module, vars(builtins), defaultdict[str, Any](lambda: Path))
     helps, found = described(taker)[1], dict[str, Option]()
-    is_model = hasattr(taker, "model_fields")
     for own, one in inspect.signature(taker).parameters.items():
+        hint, name = one.annotation, of + own
         if own in CALLERS:
             continue
-        hint, name = one.annotation, of + own
         if isinstance(hint, str):
             hint = eval(hint, module, names)  # our own source
-        parts = list(_parts(hint))
         if one.kind is one.VAR_KEYWORD:
-            taken = parts[1].__annotations__
             every = {**options_of(Profile), **options_of(Settings)}
+            taken = get_args(hint)[0].__annotations__
             found |= {key: every[key] for key in every if key.partition(".")[0] in taken}
             continue
         if hasattr(hint, "model_fields"):
             found |= options_of(hint, f"{name}.")
             continue
-        stated = next((part for part in parts if isinstance(part, Option)), None)
-        literals = (get_args(part) for part in parts if get_origin(part) is Literal)
-        words = list(dict.fromkeys(map(str, chain.from_iterable(literals))))
-        check = Literal[*words] if words else None
-        if stated is None:  # what a type states beside its kind
-            check = check or next((part for part in parts if get_origin(part) is Annotated), None)
-            stated = Option(check=check)
-        kinds, kind = {part for part in parts if isinstance(part, type)}, stated.kind
-        if kind is None:  # text where Python takes several forms
-            kind = Path if Path in kinds else str
-            if len(kinds) == 1 and not words:
-                (kind,) = kinds
+        stated, check, words, kinds = Option(), None, dict[str, None](), set[type]()
+        for part in _parts(hint):
+            if isinstance(part, Option):
+                stated = part
+            elif isinstance(part, type):
+                kinds.add(part)
+            elif get_origin(part) is Literal:
+                words |= dict.fromkeys(map(str, get_args(part)))
+                check = Literal[*words]
+            elif get_origin(part) is Annotated:
+                check = check or part
+        # text where Python takes several forms
+        kind = kinds.pop() if len(kinds) == 1 and not words else Path if Path in kinds else str
         panel, default = EVERYDAY, stated.default if one.default is None else one.default
-        if name in SELDOM or (is_model and name not in EVERYDAY_FIELDS):
+        if hasattr(taker, "model_fields"):  # a field that is not typed is not said
+            panel = EVERYDAY if name in EVERYDAY_FIELDS else ADVANCED
+            default = False if kind is bool else None
+        elif name in SELDOM:
             panel = ADVANCED
         elif one.kind is not one.KEYWORD_ONLY and name not in TYPED:
             panel = ARGUMENTS
-        if is_model:  # a field that is not typed is not said
-            default = False if kind is bool else None
         found[name] = replace(
             stated,
             name=name,
-            kind=kind,
+            kind=stated.kind or kind,
+            check=check if stated == Option() else stated.check,
             default=default,
             panel=panel,
             help=helps.get(own) or f"{', '.join(words)}.",
-            words=words,
+            words=list(words),
         )
     return found
 
@@ -241,7 +241,7 @@ def described(taker: Callable[..., Any]) -> tuple[list[str], dict[str, str]]:
 def refuse_unknown(options: Iterable[str], known: Collection[str]) -> None:
     """Raise `SettingError` at a name that is none of the known ones."""
     for name in options:
-        if name not in known:
+        if name.partition(".")[0] not in known:
             near = get_close_matches(name, known, n=1) or known
             raise SettingError(f"{name}: no setting has this name; expected {', '.join(near)}")
 
@@ -258,12 +258,10 @@ def settings_of(
     """
     refuse_unknown(options, Options.__annotations__)
     own = {name: options[name] for name in options if name in Settings.model_fields}
-    of_profile = {name: options[name] for name in options if name not in own}
     asked = (settings or Settings()).but(**own)
-    for name in OF_BOTH:
-        if name in own or getattr(asked, name) != DEFAULTS[name]:
-            of_profile[name] = getattr(asked, name)
-    return asked, of_profile
+    of_profile = {name: options[name] for name in options if name not in own or name in OF_BOTH}
+    shared = {name: value for name, value in asked if name in OF_BOTH and value != DEFAULTS[name]}
+    return asked, of_profile | shared
 
 
 def meant(
@@ -296,7 +294,7 @@ def meant(
     if isinstance(profile, str | Path):
         own = load_profile(Path(profile))
     elif isinstance(profile, Mapping):
-        own = over(None, profile)
+        own = with_settings(Profile(), profile)
     elif not isinstance(profile, Profile | None):
         raise SettingError(
             f"profile: expected a path, a dict or a Profile, found {type(profile).__name__}"
@@ -336,16 +334,12 @@ def set_by(lines: Iterable[str], known: Collection[str]) -> dict[str, Any]:
     found = dict[str, Any]()
     for line in lines:
         name, equals, text = line.partition("=")
-        channel, dot, key = map(str.strip, name.partition("."))
-        if not (equals and channel):
+        if not equals or not name.strip():
             raise SettingError(f"{flag('set')} {line}: expected KEY=VALUE like tau1.sign=-1")
         value: Any = text.strip()
         with suppress(ValueError, RecursionError):
             value = parsed_toml(f"value = {text}")["value"]
-        if dot:
-            before = found.get(channel)
-            value = (before if isinstance(before, dict) else {}) | {key: value}
-        found[channel] = value
+        found[name.strip()] = value
     refuse_unknown(found, known)
     return found
 

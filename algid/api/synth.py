@@ -245,7 +245,7 @@ def synthesise(
         refuse_existing(file, force)
     logs = simulated()
     for file, log in zip(files, logs, strict=False):
-        write_log(file, log, truth=log.origin.truth, force=force)
+        write_log(file, log, force=force)
     for file in files[len(logs) :]:
         with whole_file(file, force=force) as temporary:
             temporary.write_text(PROFILE_TEXT, encoding="utf-8")

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api import Answer
 from algid.api.options import AnyResult, LogOptions, Logs, ProfileLike, called, meant, opened, verb
-from algid.base.errors import Exit, SettingError
+from algid.base.errors import Exit, SettingError, exit_of
 from algid.base.limits import within
-from algid.notices import Notice
+from algid.notices import Notice, lossy
 from algid.options import Option, flag
 from algid.results import Result
 from algid.results.verdict import judged_errors
@@ -128,12 +128,12 @@ def validate(
     for log in survey.logs:
         name = PurePath(log.name).name
         notices += [one.of(name) for one in survey.notices(log, doubtful=doubtful)]
-    warnings = tuple(one.sentence for one in notices if not one.note)
-    return replace(found, warnings=warnings, max_nrmse=max_nrmse, judged=judged)
+    warnings, lost = tuple(one.sentence for one in notices if not one.note), lossy(notices)
+    return replace(found, warnings=warnings, max_nrmse=max_nrmse, judged=judged, data_lost=lost)
 
 
 def answer(found: Validated, given: Mapping[str, Any]) -> Answer:
-    """The tables, and what is past its limit."""
+    """The tables, and what is past its limit; 1 where something is, 4 where data were lost."""
 
     def shown() -> Iterable[Table | str]:
         yield from (row.text for row in found.judged)
@@ -142,5 +142,5 @@ def answer(found: Validated, given: Mapping[str, Any]) -> Answer:
         if found.past:
             yield f"OVER: normalised RMSE past {given['max_nrmse']:g}"
 
-    ended = Exit.LIMIT if found.over else Exit.OK
+    ended = Exit.LIMIT if found.over else exit_of(failed=False, lost=found.data_lost)
     return Answer(shown(), found.as_json, complaints=found.warnings, exit=ended)

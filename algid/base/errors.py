@@ -111,7 +111,7 @@ OF_COMMAND: Mapping[str, tuple[int, ...]] = {
     "inspect": (0, 2, 3, 4),
     "design": (0, 2, 3),
     "identify": (0, 2, 3, 4),
-    "validate": (0, 1, 2),
+    "validate": (0, 1, 2, 4),
     "batch": (0, 1, 2, 3, 4, 130),
     "track": (0, 2, 3, 4),
     "convert": (0, 2, 4),

@@ -257,14 +257,14 @@ class Batch:
         return None
 
     def _keep(self, record: JobRecord) -> bool:
-        """Write a record; where its job failed on other logs than before, their result goes."""
+        """Write a record; where its job has no result now, the one of an earlier run goes."""
         name = record.job.name
         before = self.records.get(name, record)
         try:
-            if not record.has_result and before.inputs != record.inputs:
+            if before.has_result and not record.has_result:
                 self._store.remove(f"{name}.algid")
         except OutputError as error:
-            stays = f"; the result of what its log held before stays: {error}"
+            stays = f"; the result of an earlier run stays: {error}"
             record = replace(record, reason=record.reason + stays)
         try:
             write_record(self._store, record)

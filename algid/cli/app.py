@@ -46,7 +46,7 @@ COMMANDS: Mapping[str, str] = {
 """The function of each command, whose module has the command's name, in the order of help."""
 PRINTED = ("inspect", "design", "identify", "validate", "track", "report", "compare")
 """Commands that print tables, or JSON."""
-LETTERS = {"out": "-o", "quiet": "-q", "verbose": "-v"}
+LETTERS = {"out": ["-o"], "quiet": ["-q"], "verbose": ["-v"]}
 KINDS = {Path: "PATH", float: "X", int: "N"}
 """By the type of a value what stands for it."""
 
@@ -94,8 +94,9 @@ def command(name: str) -> Command:
             text = f"NAME=VALUE of {', '.join(one.name for one in by_set)}."
         taken.append(Option(list[str], ADVANCED, "set", text, suggested=lambda: lines))
     if name in PRINTED:
-        either = click.Choice(["table", "json"])
-        taken.append(Option(either, ADVANCED, "format", "What to print.", default="table"))
+        words, text = ["table", "json"], "What to print."
+        either = click.Choice(words)
+        taken.append(Option(either, ADVANCED, "format", text, default="table", words=words))
     if name == "identify":
         taken.append(Option(bool, ADVANCED, "verbose", "All tables, logs, settings."))
     taken.append(Option(bool, ADVANCED, "quiet", "Print nothing but errors."))
@@ -131,26 +132,24 @@ def command(name: str) -> Command:
 
 def _parameter(one: Option) -> click.Parameter:
     """An option as click takes it."""
-    many, off, name = get_origin(one.kind) is list, one.default is True, one.name.upper()
+    many, name = get_origin(one.kind) is list, one.name.upper()
     kind = get_args(one.kind)[0] if many else one.kind
-    value = VALUES.get(one.name, KINDS.get(kind, "TEXT"))
+    required = one.default is inspect.Parameter.empty
     said: dict[str, Any] = {
         "type": click.Path(path_type=Path) if kind is Path else kind,
-        "metavar": "WORD" if one.words or isinstance(kind, click.Choice) else value,
-        "required": one.default is inspect.Parameter.empty,
+        "metavar": "WORD" if one.words else VALUES.get(one.name, KINDS.get(kind, "TEXT")),
+        "required": required,
     }
+    if one.default and not required:
+        said["default"] = one.default
     if one.words or one.suggested:
         said["shell_complete"] = partial(_completed, one)
-    if not (many or said["required"] or one.default in (None, False)):
-        said["default"] = one.default
     if one.panel == ARGUMENTS:
         said["metavar"] = f"{name.removesuffix('S')}..." if many else name
         return click.Argument([one.name], nargs=-1 if many else 1, **said)
-    if kind is bool:  # what is given switches it off
-        said = {"flag_value": not off, "default": off, "is_flag": True}
-    names = [one.flag if one.flag.startswith("--") else f"--{one.name}", one.name]
-    if one.name in LETTERS:
-        names.insert(0, LETTERS[one.name])
+    if kind is bool:  # what is given switches off what is on
+        said = {"flag_value": not one.default, "default": one.default, "is_flag": True}
+    names = [*LETTERS.get(one.name, ()), "--out" if one.name == "out" else one.flag, one.name]
     return click.Option(names, help=one.help, multiple=many, **said)
 
 
@@ -191,14 +190,6 @@ app = Algid(
 click.version_option(__version__, message="%(prog)s %(version)s", help="Print the version.")(app)
 
 
-def called(arguments: Sequence[str]) -> int:
-    """Run a command, or complete one, and return its exit code."""
-    if arguments or "_ALGID_COMPLETE" in os.environ:
-        return int(app.main(list(arguments), "algid", standalone_mode=False))
-    called(["--help"])
-    return Exit.USAGE
-
-
 def run(arguments: Sequence[str]) -> int:
     """Run a command and return its exit code: the outermost place, where errors become lines.
 
@@ -210,7 +201,8 @@ def run(arguments: Sequence[str]) -> int:
     try:
         try:
             refuse_moved(shlex.join(["algid", *arguments]))
-            return called(arguments)
+            code = app.main(list(arguments) or ["--help"], "algid", standalone_mode=False)
+            return code if arguments else Exit.USAGE
         finally:
             sys.stdout.flush()  # else a full disk is told by the interpreter, in its words
     except SystemExit:

@@ -79,6 +79,7 @@ class Validated:
     warnings : what its reader should know
     max_nrmse : the largest normalised RMSE allowed, if any
     judged : errors beside their limits, of a synthetic log's result
+    data_lost : whether samples of a log are missing
     """
 
     logs: Mapping[str, TorquePrediction | None] = field(default_factory=dict)
@@ -87,6 +88,7 @@ class Validated:
     warnings: tuple[str, ...] = ()
     max_nrmse: float | None = None
     judged: tuple[Judged, ...] = ()
+    data_lost: bool = False
 
     def __repr__(self) -> str:
         r2 = "unknown"
@@ -111,7 +113,7 @@ class Validated:
         every = [*self.logs.values(), self.total]
         *logs, total = (one and one.model_dump(mode="json") for one in every)
         content: dict[str, Any] = {"logs": dict(zip(self.logs, logs, strict=True))}
-        content |= {"total": total, "over": self.over}
+        content |= {"total": total, "over": self.over, "data_lost": self.data_lost}
         if self.judged:
             content["errors"] = [vars(one) for one in self.judged]
         if self.simulation:

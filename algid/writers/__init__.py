@@ -9,7 +9,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from algid.base.errors import OutputError
+from algid.base.errors import OutputError, SettingError
 from algid.log import Log, Truth, add, word_sum
 
 FORMATS = ("mcap", "parquet", "csv")
@@ -30,7 +30,8 @@ def write_log(
     path : str or Path
     log : Log, or the blocks of one in their order
     truth : Truth
-        The arm and the payload behind a synthetic log, which is written beside its samples.
+        The arm and the payload behind a synthetic log, which is written beside its samples; by
+        default the log's own.
     format : 'mcap', 'parquet' or 'csv'
         Format; that of `path`'s suffix by default.
     force : bool
@@ -38,6 +39,8 @@ def write_log(
 
     Raises
     ------
+    SettingError
+        If `path` is none.
     OutputError
         If the format is unknown, or the file cannot be written there, or exists and `force` is not
         set.
@@ -52,12 +55,17 @@ def write_log(
     ...     len(algid.read_log(f"{folder}/log.parquet"))
     1001
     """
+    if not isinstance(path, str | Path):
+        raise SettingError(
+            f"write_log: expected a path, then a log; found {type(path).__name__} first"
+        )
     path = Path(path)
     name = format or path.suffix.lstrip(".").lower()
     if name not in FORMATS:
         raise OutputError(f"{path}: expected a log of {', '.join(FORMATS)}, found {name!r:.60}")
-    blocks = [log] if isinstance(log, Log) else log
-    import_module(f"algid.writers.{name}").write(path, blocks, truth=truth, force=force)
+    if isinstance(log, Log):
+        truth, log = truth or log.origin.truth, [log]
+    import_module(f"algid.writers.{name}").write(path, log, truth=truth, force=force)
 
 
 def columns(block: Log, sums: dict[str, int]) -> dict[str, NDArray[Any]]:

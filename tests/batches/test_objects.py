@@ -266,7 +266,7 @@ def test_a_log_that_fails_once_changed_keeps_no_result(
     ]
 
 
-def test_a_job_that_fails_for_its_settings_keeps_the_result_of_its_log(
+def test_a_job_that_fails_for_its_settings_leaves_no_result_of_an_earlier_run(
     served: Served, log: bytes
 ) -> None:
     open_store(served.url("logs")).write("a.csv", log)
@@ -274,7 +274,7 @@ def test_a_job_that_fails_for_its_settings_keeps_the_result_of_its_log(
     for job in jobs_of([served.url("logs")], served.url("out")):
         failed = replace(job, trouble="no such profile")
         assert _ends(batch_of(served.url("out")).run([failed])) == {"a": JobStatus.FAILED}
-    assert open_store(served.url("out")).exists("a.algid/result.json")
+    assert not open_store(served.url("out")).exists("a.algid/result.json")
 
 
 def _replacing(served: Served, key: str, content: bytes, at: int) -> Callable[[str], None]:

@@ -4,6 +4,7 @@ asked.
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -113,6 +114,16 @@ def test_commands_say_where_their_files_are(
     done = call("identify", result.with_suffix(".mcap"), *again)
     assert done.err.endswith("wrote case1-unloaded.algid\n")
     assert done.out == call("report", "case1-unloaded.algid").out
+
+
+def test_validate_ends_with_4_where_samples_are_missing_and_with_1_past_a_limit(
+    result: Path, tmp_path: Path
+) -> None:
+    content = result.with_suffix(".mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(content[: len(content) * 3 // 4])
+    done = call("validate", result, tmp_path / "cut.mcap", "--format", "json")
+    assert (done.code, json.loads(done.out)["data_lost"]) == (4, True)
+    assert call("validate", result, tmp_path / "cut.mcap", "--max-nrmse", "1e-9").code == 1
 
 
 def test_a_batch_beside_an_arms_result_takes_its_logs_for_loaded_ones(

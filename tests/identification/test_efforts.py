@@ -118,7 +118,7 @@ def test_weight_that_is_said_not_to_be_there_is_named(said: dict[str, Any]) -> N
     assert found.verdict.failed
     assert "weight" in found.verdict.reasons[0].text
     remedy = found.verdict.reasons[0].remedy
-    assert identify(log, report=False, **said | remedy.keywords).verdict.grade == "good"
+    assert identify(log, report=False, **{**said, **remedy.settings}).verdict.grade == "good"
 
 
 def test_a_payload_that_is_compensated_too_needs_a_length() -> None:

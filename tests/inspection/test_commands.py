@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 from pydantic import BaseModel
 
+import algid
 from algid.base.errors import OutputError, SettingError
 from algid.inspection.checks import inspect_log
 from algid.profile import Angle, Profile, Torque, Velocity, load_profile
@@ -78,13 +80,18 @@ def test_inspect_on_a_cut_file_exits_with_4(tmp_path: Path) -> None:
 @pytest.mark.parametrize("target", FORMATS)
 def test_convert_keeps_every_bit_and_the_truth(source: str, target: str, tmp_path: Path) -> None:
     log = noise_log()
-    write_log(tmp_path / f"in.{source}", log, truth=TRUTH)
+    write_log(tmp_path / f"in.{source}", replace(log, origin=replace(log.origin, truth=TRUTH)))
     run("convert", tmp_path / f"in.{source}", "-o", tmp_path / f"out.{target}")
     found = read_log(tmp_path / f"out.{target}")
     assert same(found, log)
     assert found.origin.truth == TRUTH
     with pytest.raises(OutputError, match="--force"):
         run("convert", tmp_path / f"in.{source}", "-o", tmp_path / f"out.{target}")
+
+
+def test_a_log_is_written_to_a_path_that_is_named_first(tmp_path: Path) -> None:
+    with pytest.raises(SettingError, match=r"^write_log: expected a path, then a log; found Log"):
+        algid.write_log(noise_log(), tmp_path / "in.csv")  # type: ignore[arg-type]
 
 
 def test_convert_refuses_unknown_formats_and_settings(tmp_path: Path) -> None:

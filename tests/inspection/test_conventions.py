@@ -80,7 +80,7 @@ def test_the_settings_named_mend_the_log(row: str, kind: str, tmp_path: Path) ->
     path = written(tmp_path / f"arm.{kind}", *recorded(row))
     found = mended(read_log(path))
     assert found is not None
-    log = read_log(path, with_settings(Profile(), found.remedies[0].keywords))
+    log = read_log(path, with_settings(Profile(), found.remedies[0].settings))
     assert mended(log) is None
     turned = log.tau[1] @ RIGHT.tau[1] < 0  # from behind
     right = np.stack([np.pi - RIGHT.theta[0], -RIGHT.theta[1]]) if turned else RIGHT.theta
@@ -111,5 +111,5 @@ def test_settings_change_what_a_profile_said(
     profile = with_settings(Profile(), wrong)
     found = mended(read_log(path, profile))
     assert found is not None
-    log = read_log(path, with_settings(profile, found.remedies[0].keywords))
+    log = read_log(path, with_settings(profile, found.remedies[0].settings))
     assert mended(log) is None

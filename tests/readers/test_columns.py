@@ -183,7 +183,7 @@ def test_a_unit_of_no_joint_is_refused_where_it_counts() -> None:
         "the column 'q1_inch' for theta1 is in 'inch'; expected one of rad, mrad, deg, rev, rpm, "
         "counts; say its unit if that is wrong: --set theta1.unit=rad"
     )
-    assert '--set tau2.unit="N m"' in refusal(PLAIN, None, tau2="%")
+    assert "--set 'tau2.unit=\"N m\"'" in refusal(PLAIN, None, tau2="%")
     (foreign,) = said(assigned("t q1_inch q2 tau1 tau2", {"theta1": {"unit": "rev"}}))
     assert (
         foreign[1]

@@ -114,7 +114,7 @@ REFUSALS = {
     ),
     "current that is a torque": Refusal(
         table("t,q1,q2,current1,current2"), "unit",
-        '--set tau1.unit="N m" --set tau2.unit="N m"', "OTHER_UNIT",
+        "--set 'tau1.unit=\"N m\"' --set 'tau2.unit=\"N m\"'", "OTHER_UNIT",
     ),
     "counts": Refusal(
         table("t,q1_counts,q2_counts,tau1,tau2"), "counts a turn", "--set theta1.counts=4096 "
@@ -125,7 +125,7 @@ REFUSALS = {
         '--set theta1.unit="rad"', "OTHER_UNIT",
     ),
     "a torque in degrees": Refusal(
-        table("t,q1,q2,tau1 [deg],tau2"), "expected one of", '--set tau1.unit="N m"'
+        table("t,q1,q2,tau1 [deg],tau2"), "expected one of", "--set 'tau1.unit=\"N m\"'"
     ),
     "motor torques beside joint angles": Refusal(
         table("t,joint1_pos,joint2_pos,motor1_torque,motor2_torque"),
@@ -174,7 +174,7 @@ def test_each_refusal_yields_to_the_flag_it_names(name: str, tmp_path: Path) -> 
         with pytest.raises(LogError) as refused:
             noticed(read_log(path))
         assert refusal.words in str(refused.value)
-        first = re.match(r"--[\w-]+ [\w./]+", refusal.flags)
+        first = re.match(r"--[\w-]+ '?[\w./]+", refusal.flags)
         named = first[0].rpartition(" ")[0] if "--set" not in refusal.flags else first[0]
         assert named in str(refused.value)
         assert flag_first(str(refused.value)), refused.value
