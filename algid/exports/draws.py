@@ -34,7 +34,7 @@ from algid.results import Result
 
 TABLES = ("csv", "parquet")
 _HOPELESS = 100
-"""Draws in a row that no arm is like, which says that the estimates are none's."""
+"""Draws that no arm is like for each that one is: more say that the estimates are none's."""
 
 
 def drawn_files(
@@ -73,12 +73,12 @@ def drawn_files(
     broken = list[str]()
     files: dict[str, bytes] = {"manifest.json": b""}
     rows: list[dict[str, Any]] = []
-    refused = in_a_row = 0
+    refused = 0
     while len(rows) < count:
-        if in_a_row == _HOPELESS:
+        if refused >= _HOPELESS * (len(rows) + 1):
             raise ResultError(
-                f"{file}: {_HOPELESS} draws in a row are no arm ({broken[-1]}); identify it from "
-                "more informative logs"
+                f"{file}: {refused} of {refused + len(rows)} draws are no arm ({broken[-1]}); "
+                "identify it from more informative logs"
             )
         wide = np.sqrt(freedom / random.chisquare(freedom))
         one_each = random.multivariate_normal(
@@ -98,9 +98,9 @@ def drawn_files(
         except (ResultError, SettingError) as error:
             broken.append(str(error))
         if broken:
-            refused, in_a_row = refused + 1, in_a_row + 1
+            refused += 1
             continue
-        in_a_row, row = 0, dict[str, Any](draw=len(rows) + 1)
+        row: dict[str, Any] = {"draw": len(rows) + 1}
         if to not in TABLES:
             row["file"] = f"draw-{row['draw']:0{len(str(count))}d}{SUFFIXES[to]}"
             said = f"{one.source}, draw {row['draw']} of seed {seed}"

@@ -39,13 +39,13 @@ _STANDS, _CLEAR = 0.4, 6.0
 """Turning points: share of the speed three samples off, and that speed over the noise."""
 _DEAD, _DEAD_RUNS = 0.1, 20
 """A torque that keeps one value for so many s and usual runs is not measured."""
-_HELD_RUNS, _HELD_SHARE = 50, 0.6
-"""Changes of a torque that show its clock, and of how many of the samples at most they are."""
+_HELD_RUNS = 50
+"""Changes of a torque that show its clock."""
 _OFF_STEP, _IN_STEP = 0.15, 0.9
 """Largest distance of a held torque's runs from whole steps, and least share of such runs."""
 _TURN = 2 * math.pi
-_AS_DEGREES = 0.055
-"""Of the logarithm of a degree: a fifth of a ratio of angles to velocities, either way."""
+_DEGREES, _AS_DEGREES = 180 / math.pi, 1.25
+"""Of a rad, and how far off a ratio of angles to velocities may be from it, either way."""
 
 
 def _found(code: str, origin: Origin, name: str, *remedies: Remedy, **numbers: Any) -> Notice:
@@ -95,14 +95,13 @@ def held_efforts(log: Log) -> Iterator[Notice]:
     """
     for (name, tau), theta in zip(channels(log, ("tau",)), log.theta, strict=True):
         changes = np.flatnonzero(np.diff(tau))
-        if not _HELD_RUNS <= changes.size < (tau.size - 1) * _HELD_SHARE:
-            continue
         runs = np.diff(changes)
         usual = median(thinned(runs))
+        if changes.size < _HELD_RUNS or usual < 2:
+            continue
         off = np.abs(runs - usual * np.maximum(1.0, np.round(runs / usual)))
-        in_step = float(np.mean(off <= _OFF_STEP * usual))
         moves = np.count_nonzero(np.diff(theta)) > 1.5 * changes.size
-        if usual >= 2 and in_step >= _IN_STEP and moves:
+        if moves and np.mean(off <= _OFF_STEP * usual) >= _IN_STEP:
             late = 0.5e3 * (usual - 1) * log.period  # ms, in the mean
             held = 1e3 * usual * log.period
             yield _found("HELD_EFFORT", log.origin, name, held=held, late=late)
@@ -167,11 +166,10 @@ def degrees(log: Log, is_to_scale: Callable[[], bool]) -> Iterator[Notice]:
             np.abs(np.diff(one[:, ::apart])).sum(axis=1) for one in (log.theta, path)
         )
         ratios = np.divide(travelled, summed, out=ratios, where=summed > 0)
-    for joint, ratio in enumerate(ratios.tolist(), start=1):
-        power = math.log(max(ratio, 1e-9)) / math.log(180 / math.pi)
-        if len(log) > 20 and abs(abs(power) - 1) < _AS_DEGREES:
-            what, quantity = ("angles", "theta") if power > 0 else ("velocities", "omega")
-            found.append((f"{quantity}{joint}", {"case": "signal", "what": what, "joint": joint}))
+    for what, name, wrong in ("angles", "theta", _DEGREES), ("velocities", "omega", 1 / _DEGREES):
+        for joint, off in enumerate((ratios / wrong).tolist(), start=1):
+            if len(log) > 20 and 1 / _AS_DEGREES < off < _AS_DEGREES:
+                found.append((f"{name}{joint}", {"case": "signal", "what": what, "joint": joint}))
     widest = np.abs(log.theta).max(axis=1)
     if widest.max() > 12 * math.pi and not ratios.any() and not is_to_scale():
         reach = {"case": "reach", "largest": float(widest.max())}

@@ -220,11 +220,12 @@ def intervals(result: Result) -> Panels:
     panels = down("intervals", over, list(known), 1.15 * max(widest, 1e-6))
     bars = {"type": "data", "array": shares, "thickness": 2.5, "width": 0}
     panels.add(0, [0.0] * len(known), list(known), "estimate with its interval", error_x=bars)
-    beside, logs = [("truth", known_truth(result))], result.logs
-    for log, own in zip(logs, result.fit.by_log if result.fit else (), strict=False):
-        if len(logs) > 1 and log.role == "unloaded":  # a loaded one's hold its payload's share
-            found = {name: one.estimate for name, one in own.items() if one.estimate is not None}
-            beside.insert(-1, ("each log by itself", found))
+    beside, by_log = [("truth", known_truth(result))], result.fit.by_log if result.fit else []
+    if len(by_log) == len(result.logs) > 1:
+        for log, own in zip(result.logs, by_log, strict=True):
+            if log.role == "unloaded":  # a loaded one's hold its payload's share
+                found = {n: one.estimate for n, one in own.items() if one.estimate is not None}
+                beside.insert(-1, ("each log by itself", found))
     for name, found in beside:
         names = [one for one in known if one in found]
         x = [100 * (found[one] - known[one]) / abs(known[one]) for one in names]

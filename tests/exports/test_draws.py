@@ -95,7 +95,7 @@ def test_every_draw_is_a_possible_arm() -> None:
         said = re.findall(r'(?:mass value|ixx|iyy|izz)="([^"]+)"', files[row["file"]].decode())
         assert len(said) == 8
         assert min(map(float, said)) > 0
-    with pytest.raises(ResultError, match=r"100 draws in a row are no arm .f1 >= 0.; identify"):
+    with pytest.raises(ResultError, match=r"100 of 100 draws are no arm .f1 >= 0.; identify"):
         drawn(correlated(value=VALUE | {"f1": -0.4}), "csv", 1, 0)
 
 
