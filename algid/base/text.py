@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import string
 import textwrap
 import unicodedata
 from collections import Counter
@@ -111,16 +112,23 @@ LARGEST_FIXED = 1e6
 MOST_DIGITS = 8
 
 
-def formatted(value: float | None, form: str) -> str:
-    """`value` as the format `form` writes it, a dash where there is none."""
-    if value is None:
-        return ABSENT
-    return f"{value:{form}}"
+class _Cells(string.Formatter):
+    """Python's formats, and ``{:~3}`` for three significant digits; None is a dash, True is yes."""
+
+    def format_field(self, value: Any, spec: str) -> str:
+        """One value as `spec` has it."""
+        if value is None:
+            return ABSENT
+        if isinstance(value, bool):
+            return "yes" if value else "no"
+        if spec.startswith("~"):
+            return significant(value, int(spec[1:]))
+        return str(format(value, spec))
 
 
-def yes_or_no(value: bool) -> str:
-    """A truth value in a table."""
-    return "yes" if value else "no"
+def cells(form: str, *values: Any, **named: Any) -> tuple[str, ...]:
+    """A row of a table: each cell as its part of `form` has it, with " | " between the parts."""
+    return tuple(_Cells().vformat(part, values, named) for part in form.split(" | "))
 
 
 def significant(value: float | None, digits: int = 5) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from algid.base.files import whole_file
 from algid.base.significance import NORMAL
-from algid.base.text import ABSENT, counted, joined, percent, significant, unit_text, visible
+from algid.base.text import cells, counted, joined, percent, significant, unit_text, visible
 from algid.fleet.findings import ALPHA, CHANGED, SPAN
 from algid.fleet.history import History
 from algid.model import UNITS
@@ -20,6 +19,11 @@ from algid.report.document import Document, Section, Table
 from algid.report.plot import Panels
 from algid.report.render import page, write_texts
 
+ROBOT = "{latest} | {robot} | {logs} | {found} | {first:%Y-%m-%d} | {last:%Y-%m-%d}"
+OF = "{job} | {robot} | {parameter} | {kind} | "
+ONE = OF + "{value:~5} for {expected:~5} | {sigmas:~2} | {time:%Y-%m-%d}"
+DRIFT = OF + "{value} ± {half} % | {sigmas:~2} | {time:%Y-%m-%d}"
+STEP = OF + "{value} ± {half} % | {sigmas:~2} | {before:%Y-%m-%d} to {time:%Y-%m-%d}"
 MOST_ROBOTS = 40  # whose table is printed
 MOST_ROWS = 200
 MOST_NAMED = 3  # in a reason of the verdict
@@ -75,8 +79,7 @@ def robot_table(history: History) -> Table:
     counts, rows = dict(history.findings["robot"].value_counts().iter_rows()), []
     for row in history.roster.head(MOST_ROWS).iter_rows(named=True):
         found = counts.get(row["robot"]) or ("none" if row["tested"] else "not tested")
-        own = (visible(row["latest"]), visible(row["robot"]), str(row["logs"]), str(found))
-        rows.append((*own, _day(row["first"]), _day(row["last"])))
+        rows.append(cells(ROBOT, found=found, **row))
     columns, cut = "Latest log | Robot | Logs | Findings | From | To", _cut(history.roster, "robot")
     return Table("Robots", columns, rows, cut)
 
@@ -85,14 +88,11 @@ def finding_table(history: History) -> Table:
     """Drifts, steps, payloads unlike their labels and outliers, of each the clearest first."""
     rows = []
     for row in history.findings.head(MOST_ROWS).iter_rows(named=True):
-        value, half, expected, when = row["value"], row["half"], row["expected"], _day(row["time"])
-        by = f"{percent(value, expected, 3)} ± {percent(half, expected)} %"
-        if half is None:
-            by = f"{significant(value)} for {significant(expected)}"
-        if row["before"]:
-            when = f"{_day(row['before'])} to {when}"
-        own = (visible(row["job"]), visible(row["robot"]), row["parameter"], row["kind"])
-        rows.append((*own, by, significant(row["sigmas"], 2), when))
+        own, value, expected = ONE, row["value"], row["expected"]
+        if row["half"] is not None:
+            own = STEP if row["before"] else DRIFT
+            row |= {"value": percent(value, expected, 3), "half": percent(row["half"], expected)}
+        rows.append(cells(own, **row))
     note = (
         f"± is 95 %. A drift is a slope a month over {SPAN} months with p < "
         f"{significant(ALPHA, 1)}; a step, where an arm, a drive or a convention was replaced, has "
@@ -107,10 +107,6 @@ def _cut(every: pl.DataFrame, things: str) -> str:
     """That a long table is cut; nothing of a short one."""
     cut = f"{counted(every.height, things)}; the first {MOST_ROWS} are shown."
     return cut if every.height > MOST_ROWS else ""
-
-
-def _day(time: datetime | None) -> str:
-    return ABSENT if time is None else time.date().isoformat()
 
 
 def overview(history: History) -> Panels | None:

@@ -14,13 +14,12 @@ from algid.arm import CONSTANT_NAMES
 from algid.base.text import (
     ABSENT,
     as_toml,
+    cells,
     file_name,
-    formatted,
     joined,
     resolved,
     significant,
     unit_text,
-    yes_or_no,
 )
 from algid.notices import NAMED, flat
 from algid.report.document import Table
@@ -36,7 +35,15 @@ INTERVALS_REST_ON = {
 }
 
 
-LOG = "{0.role} | {0.format} | {0.rows:,} | {0.duration:.6g} | {0.rate:.6g}"
+TABLE4 = (
+    "{0.parameter} | {1} | {2:~2} | {3} | {0.truth:~5} | {0.error_percent:~4} | "
+    "{0.paper_error_percent:~4}"
+)
+PREDICTION = "{0} | {1} | {2:~3} | {3:~3} | {4:.5f} | {5:~3} | {6:~3} | {7:~3}"
+TERM = "{0.term} | {0.delta_bic:+.1f} | {0.evidence:+.1f} | {0.kept} | {0.why}"
+WHITENESS = "{0} | {1.white} | {1.p_value:~2} | {1.lag1_correlation:.3f}"
+BOUND = "{0.bound} | {0.value:~4} | {0.distance_sigma:~2}"
+LOG = "{0} | {1.role} | {1.format} | {1.rows:,} | {1.duration:.6g} | {1.rate:.6g}"
 
 
 def estimates_table(title: str, estimates: Mapping[str, Estimate], result: Result) -> Table:
@@ -71,9 +78,7 @@ def paper_tables(result: Result) -> tuple[Table, ...]:
     rows = []
     for row in result.table4 if known_truth(result) else ():
         half = None if row.std is None else result.quantile * row.std
-        errors = [significant(one, 4) for one in (row.error_percent, row.paper_error_percent)]
-        numbers = (resolved(row.estimate, row.std), significant(half, 2), unit_text(row.unit))
-        rows.append((row.parameter, *numbers, significant(row.truth), *errors))
+        rows.append(cells(TABLE4, row, resolved(row.estimate, row.std), half, unit_text(row.unit)))
     return (
         estimates_table("Payload by the paper's route", result.paper_payload, result),
         estimates_table("Loaded arm", result.loaded, result),
@@ -101,9 +106,9 @@ def prediction_table(found: Mapping[str, TorquePrediction | None]) -> Table:
         stands = any(one.rmse_rest or ())
         states = (one.rmse_moving, one.rmse_rest, one.rmse_held) if stands else (None,) * 3
         for joint in (0, 1):
-            values = one.rmse[joint], 100 * one.nrmse[joint], *(of and of[joint] for of in states)
-            rmse, nrmse, *more = (significant(value, 3) for value in values)
-            rows.append((where, str(joint + 1), rmse, nrmse, f"{one.r2[joint]:.5f}", *more))
+            values = one.rmse[joint], 100 * one.nrmse[joint], one.r2[joint]
+            more = [of and of[joint] for of in states]
+            rows.append(cells(PREDICTION, where, joint + 1, *values, *more))
     return Table(
         "Torque prediction",
         "Torque of | Joint | RMSE, N m | RMSE / RMS, % | R² | Moving | At rest | Beyond ± f there",
@@ -114,40 +119,34 @@ def prediction_table(found: Mapping[str, TorquePrediction | None]) -> Table:
 
 def terms_table(fit: FitSummary | None) -> Table:
     """Optional terms of the torque and their worth."""
-    rows = []
-    for term in fit.terms if fit else ():
-        cells = (formatted(value, "+.1f") for value in (term.delta_bic, term.evidence))
-        rows.append((term.term, *cells, yes_or_no(term.kept), term.why))
     return Table(
         "Terms tried",
         "Term | Change of BIC | Beyond chance | Kept | Why",
-        rows,
+        [cells(TERM, one) for one in (fit.terms if fit else ())],
         "A negative change of BIC, and what is explained beyond chance, favour the term.",
     )
 
 
 def fit_tables(fit: FitSummary | None) -> tuple[Table, ...]:
     """Noise of the logs, whiteness of the residual, and bounds of physics that are broken."""
-    noise, tests, bounds = [], [], []
     if fit is None:
         return ()
+    noise = []
     for name, std in fit.noise.items():
-        noise.append((name, significant(std, 3), "N m" if name.startswith("tau") else "rad"))
-    for name, test in fit.whiteness.items():
-        numbers = (significant(test.p_value, 2), f"{test.lag1_correlation:.3f}")
-        tests.append((name, yes_or_no(test.white), *numbers))
-    for one in fit.broken_bounds:
-        bounds.append((one.bound, significant(one.value, 4), significant(one.distance_sigma, 2)))
-    basis = f"The intervals rest on {INTERVALS_REST_ON[fit.intervals]}."
+        noise.append(cells("{0} | {1:~3} | {2}", name, std, "N m" if name[:3] == "tau" else "rad"))
     return (
         Table("Noise of the logs", "Signal | Noise, std | Unit", noise),
         Table(
             "Whiteness of the residual",
             "Residual | White | p-value | Lag-one correlation",
-            tests,
-            basis,
+            [cells(WHITENESS, *one) for one in fit.whiteness.items()],
+            f"The intervals rest on {INTERVALS_REST_ON[fit.intervals]}.",
         ),
-        Table("Physical bounds that are broken", "Bound | Value | Broken by, σ", bounds),
+        Table(
+            "Physical bounds that are broken",
+            "Bound | Value | Broken by, σ",
+            [cells(BOUND, one) for one in fit.broken_bounds],
+        ),
     )
 
 
@@ -155,7 +154,7 @@ def log_tables(logs: Sequence[LogSummary]) -> tuple[Table, Table]:
     """`logs`, and from which channel each signal was taken, once for all logs that share it."""
     rows, taken = [], dict[tuple[str, str], list[str]]()
     for log in logs:
-        rows.append((file_name(log.path), *LOG.format(log).split(" | ")))
+        rows.append(cells(LOG, file_name(log.path), log))
         for pair in log.mapping.items():
             taken.setdefault(pair, []).append(file_name(log.path))
     channels = []

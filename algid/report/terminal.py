@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Literal
 
 from algid.arm import CONSTANT_NAMES as ARM
-from algid.base.text import ABSENT, counted, formatted, joined, lines_of, printable, visible
+from algid.base.text import ABSENT, cells, counted, joined, lines_of, printable, visible
 from algid.model import DELAYS
 from algid.notices import MOST_REASONS, Grade, Verdict, codes_of
 from algid.report.document import Document, Kind, Table
@@ -37,7 +37,8 @@ CLOCK = (
     "{rows:,} samples, {duration:.6g} s at {rate:.6g} Hz, jitter {jitter:.3g} s, gaps: {gaps}, the "
     "longest {longest_gap:.3g} s"
 )
-SIGNAL = "{low:.4g} | {high:.4g} | {noise:.4g} | {step:.4g} | {saturated:.4g}"
+ENTRY = "{0.name} | {0.type} | {0.count} | {0.rate:.4g}"
+SIGNAL = "{0} | {1.low:.4g} | {1.high:.4g} | {1.noise:.4g} | {1.step:.4g} | {1.saturated:.4g}"
 DYNAMICS = (
     "excitation: condition number {condition:.4g}; as read, the equations of motion explain "
     "{explained:.1%} of the torques: k4 {weight1:.3g} N m, k2 {weight2:.3g} N m"
@@ -160,11 +161,10 @@ def inspection_content(found: Inspection) -> Iterator[Table | str]:
     """Tables, and lines between them, from what the log holds to what is wrong with it."""
     synthetic = ", synthetic" if found.synthetic else ""
     yield f"{visible(found.path, 1000)}: {found.format}{synthetic}"
-    rows, shown, left = [], found.entries[:MOST_SHOWN], len(found.entries) - MOST_SHOWN
-    for one in shown:
-        rows.append((one.name, one.type, formatted(one.count, ""), formatted(one.rate, ".4g")))
-    if rows:
+    shown, left = found.entries[:MOST_SHOWN], len(found.entries) - MOST_SHOWN
+    if shown:
         note = f"and {left} more" if left > 0 else ""
+        rows = [cells(ENTRY, one) for one in shown]
         yield Table("Channels", "Name | Type | Samples | Hz", rows, note)
     for one in shown:
         if one.joints or one.fields:
@@ -176,9 +176,7 @@ def inspection_content(found: Inspection) -> Iterator[Table | str]:
     if found.clock is not None:
         yield CLOCK.format(**vars(found.clock))
     if found.signals:
-        figures = [
-            (name, *SIGNAL.format(**vars(of)).split(" | ")) for name, of in found.signals.items()
-        ]
+        figures = [cells(SIGNAL, *one) for one in found.signals.items()]
         yield Table("Signals", "Channel | Low | High | Noise | Step | Saturated share", figures)
     if found.dynamics is not None:
         yield DYNAMICS.format(**vars(found.dynamics)).replace("%", " %")

@@ -13,7 +13,7 @@ import numpy as np
 
 from algid.base.criteria import HOLE
 from algid.base.significance import NORMAL
-from algid.base.text import counted, file_name, formatted, joined, resolved, significant
+from algid.base.text import cells, counted, file_name, joined, resolved, significant
 from algid.notices import Notice, Verdict, graded, lossy, notes_of, warnings_of
 from algid.report.document import Document, Section, Table
 from algid.report.export import write_mcap
@@ -34,6 +34,7 @@ from algid.tracks.result import (
     write_tables,
 )
 
+CHANGE = "{0} | {1:.3f} | {2} | kg | [{3:.3f}, {4:.3f}] | {5:.3f}"
 COLOURED = 4.0  # of the rows' variance: intervals twice as wide as the sensors' noise asks for
 STRANGE = 1e4
 """Of the rows' variance: a real arm with friction reaches 6e3, another arm 5e4 and more."""
@@ -122,8 +123,7 @@ def change_table(result: TrackResult) -> Table:
         step = after.m_p - before.m_p
         by = ("" if step < 0 else "+") + resolved(step, max(before.std, after.std))
         near = min(times, key=lambda time: abs(time - moment), default=None)
-        between = f"[{low:.3f}, {high:.3f}]"
-        rows.append((str(place + 1), f"{moment:.3f}", by, "kg", between, formatted(near, ".3f")))
+        rows.append(cells(CHANGE, place + 1, moment, by, low, high, near))
     return Table(
         "Changes",
         "Change | At, s | By | Unit | Between, s | Truth at, s",
