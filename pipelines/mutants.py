@@ -17,7 +17,7 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -47,7 +47,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "exports": ("exports",),
     "fleet": ("fleet",),
     "identification": ("identification", *GOLDEN),
-    "inspection": ("inspection",),
+    "inspection": ("inspection", "identification/test_efforts.py"),
     "model": ("estimators/test_model.py", *GOLDEN),
     "notices": ("test_notices.py", "test_check.py", *FRONT),
     "options": FRONT,
@@ -139,16 +139,21 @@ def tests_of(room: str) -> list[str]:
 
 
 def chosen(mutant: Mutant, seconds: dict[str, float], lines: dict[str, list[str]]) -> list[str]:
-    """Of the room's tests those that reach the mutant's lines first, then those beside them: what
-    a fixture or another process reaches is told of one test alone.
+    """Of the room's tests those that reach the mutant's lines first, then those that reach its
+    file, then those beside them: what is reached on import, by a fixture or by another process is
+    told of one test or of none.
     """
     reach = {test for line in mutant.lines for test in lines.get(str(line), ())}
-    beside = {test.partition("::")[0] for test in reach}
+    file = {test for tests in lines.values() for test in tests}
+    beside = {test.partition("::")[0] for test in file}
     kept: list[str] = []
-    spent = 0.0 if reach else 0.75 * BUDGET
-    for test in sorted(
-        seconds, key=lambda t: (t not in reach, t.partition("::")[0] not in beside, seconds[t])
-    ):
+    spent = 0.0
+
+    def far(test: str) -> tuple[bool, bool, bool, float]:
+        own = test.partition("::")[0]
+        return test not in reach, test not in file, own not in beside, seconds[test]
+
+    for test in sorted(seconds, key=far):
         spent += seconds[test]
         if kept and spent > BUDGET:
             break
@@ -156,17 +161,17 @@ def chosen(mutant: Mutant, seconds: dict[str, float], lines: dict[str, list[str]
     return kept
 
 
-def recorded(folder: Path, rooms: Sequence[str]) -> dict[str, Any]:
-    """The seconds of each test of the rooms, and the tests that reach each line of their files.
+def recorded(folder: Path, tests: Mapping[str, Sequence[str]]) -> dict[str, Any]:
+    """The seconds of each test, by room, and the tests that reach each line of the rooms' files.
 
     Raises
     ------
     SystemExit
         Where the tests fail without a mutant.
     """
-    tests = {test for room in rooms for test in tests_of(room)}
-    sources = [str(path) for room in rooms for path in files(room)]
-    asked = json.dumps({"tests": sorted(tests), "sources": sources})
+    sources = [str(path) for room in tests for path in files(room)]
+    every = sorted({test for own in tests.values() for test in own})
+    asked = json.dumps({"tests": every, "sources": sources})
     done = subprocess.run([*TRIAL, asked], cwd=folder, capture_output=True, text=True)
     if done.returncode:
         raise SystemExit(done.stdout[-3000:] + done.stderr[-1000:])
@@ -223,20 +228,22 @@ def main() -> None:
     parser.add_argument("--asked", type=float, default=0.85)
     parser.add_argument("--folder", type=Path, default=Path("build/mutants"))
     parser.add_argument("--only", nargs="+", default=(), help="names of those that are to be tried")
+    parser.add_argument("--tests", nargs="+", default=(), help="instead of the room's")
     options = parser.parse_args()
     shutil.rmtree(options.folder, ignore_errors=True)
     options.folder.mkdir(parents=True)
     for name in COPIED:
         source = Path(name)
         (shutil.copytree if source.is_dir() else shutil.copy)(source, options.folder / name)
-    below, known = False, recorded(options.folder, options.rooms)
+    tests = {room: list(options.tests) or tests_of(room) for room in options.rooms}
+    below, known = False, recorded(options.folder, tests)
     for room in options.rooms:
         every = [mutant for path in files(room) for mutant in mutants(path)]
         drawn = random.Random(options.seed).sample(every, min(options.count, len(every)))
         if options.only:
             drawn = [mutant for mutant in every if mutant.name in options.only]
         ends: Counter[str] = Counter()
-        own = tuple(tests_of(room))
+        own = tuple(tests[room])
         seconds = {test: took for test, took in known["seconds"].items() if test.startswith(own)}
         for mutant, end in tried(options.folder, drawn, seconds, known["lines"]):
             ends[end] += 1

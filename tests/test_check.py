@@ -75,6 +75,7 @@ def test_a_file_names_the_rows_that_are_checked(tmp_path: Path) -> None:
         _judged(file)
     for text, said in (
         ("", "max_error_percent"),
+        ("[max_error_percent]\n", "max_error_percent"),
         ("[max_error_percent]\nk1 = -1\n", "k1"),
         ("more = 1\n", "more"),
     ):

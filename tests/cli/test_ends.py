@@ -110,10 +110,10 @@ def test_commands_say_where_their_files_are(
     done = call("compare", result, result, "-o", ".")
     assert (done.code, done.err) == (0, "wrote compare.html\n")
     assert Path("compare.html").is_file()
-    again = ("--estimator", "weak", "--no-report", "-v")
+    again = ("--estimator", "weak", "--no-report", "-v", "--name", "mine")
     done = call("identify", result.with_suffix(".mcap"), *again)
-    assert done.err.endswith("wrote case1-unloaded.algid\n")
-    assert done.out == call("report", "case1-unloaded.algid").out
+    assert done.err.endswith("wrote mine.algid\n")
+    assert done.out == call("report", "mine.algid").out
 
 
 def test_validate_ends_with_4_where_samples_are_missing_and_with_1_past_a_limit(
@@ -202,8 +202,16 @@ def test_no_torque_and_a_replayed_one(tmp_path: Path) -> None:
     assert still["tau1"].abs().max() == 0
     assert still["theta1"].to_numpy() == pytest.approx(-math.pi / 2, abs=1e-9)  # hanging at rest
     wide = synthetic(tmp_path / "wide", "--torque", "wide")
-    again = synthetic(tmp_path / "again", "--torque", str(tmp_path / "wide" / "case1-unloaded.csv"))
-    assert again["tau1"].to_numpy() == pytest.approx(wide["tau1"].to_numpy(), abs=1e-9)
+    replayed = ("--torque", str(tmp_path / "wide" / "case1-unloaded.csv"))
+    off = list[float]()
+    for name, flags in (("held", ()), ("linear", ("--torque-hold", "foh"))):
+        again = synthetic(tmp_path / name, *replayed, *flags)
+        assert again["tau1"].to_numpy() == pytest.approx(wide["tau1"].to_numpy(), abs=1e-9)
+        off.append(float(np.abs(again["theta1"].to_numpy() - wide["theta1"].to_numpy()).max()))
+    assert off[1] < 0.1 * off[0]
+    held = synthetic(tmp_path / "zoh", "--torque", "wide", "--torque-hold", "zoh")
+    apart = np.abs(held["theta1"].to_numpy() - wide["theta1"].to_numpy()).max()
+    assert apart == pytest.approx(off[0], rel=1e-3)
 
 
 def prior() -> Any:

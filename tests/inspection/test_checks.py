@@ -77,10 +77,13 @@ def test_encoder_step_and_noise_floor() -> None:
     draw = np.random.default_rng(7)
     smooth = np.sin(np.arange(5000) * 1e-3)
     # the robust deviation of 5000 draws is good to a few percent
-    assert signal_figures(smooth + draw.normal(0, 1e-3, 5000)).noise == pytest.approx(1e-3, rel=0.1)
+    noisy = smooth + draw.normal(0, 1e-3, 5000)
+    for values in (noisy, np.resize(noisy, 1 << 19)):  # of the longer every second value
+        assert signal_figures(values).noise == pytest.approx(1e-3, rel=0.1)
     stepped = np.rint(smooth / 3.8e-4) * 3.8e-4
     assert signal_figures(stepped).step == pytest.approx(3.8e-4, rel=1e-6)
     assert signal_figures(smooth).step == 0
+    assert signal_figures(np.array([0.0, 1.0, 1.0])).step == 0  # two levels are no grid
 
 
 @pytest.mark.slow

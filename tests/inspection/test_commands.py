@@ -69,11 +69,12 @@ def test_inspect_works_on_what_it_refuses(tmp_path: Path) -> None:
     )
 
 
-def test_inspect_on_a_cut_file_exits_with_4(tmp_path: Path) -> None:
+def test_inspect_and_convert_of_a_cut_file_exit_with_4(tmp_path: Path) -> None:
     write_log(tmp_path / "arm.mcap", moving_log(60_000))
     content = (tmp_path / "arm.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(content[: len(content) * 3 // 4])
     assert "CUT_OFF" in run("inspect", tmp_path / "cut.mcap", code=4)
+    run("convert", tmp_path / "cut.mcap", "-o", tmp_path / "rest.csv", code=4)
 
 
 @pytest.mark.parametrize("source", FORMATS)

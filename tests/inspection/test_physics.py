@@ -93,9 +93,8 @@ def test_torques_without_weight_and_of_noise() -> None:
     light = moving_log(20_000, 0.5, np.where([0, 1, 0, 1, 0, 0, 0], 0.0, K))
     (found,) = [one for one in noticed(light) if one.code in CONVENTIONAL]
     assert found.code == "GRAVITY_COMPENSATED"
-    assert [one.settings for one in found.remedies] == [
-        {"effort": "gravity-compensated"}, {"gravity": 0},
-    ]  # fmt: skip
+    driver = "for such a driver: --effort gravity-compensated"
+    assert found.advice == f"{driver}; for a horizontal plane: --gravity 0"
     # slow and reversed it leaves open what is wrong, and is not called weightless
     slow = moving_log(20_000, 0.1, np.where([0, 1, 0, 1, 0, 0, 0], 0.0, K))
     assert not CONVENTIONAL & {one.code for one in noticed(replace(slow, tau=-slow.tau))}

@@ -127,7 +127,10 @@ CASES = {
         codes=["NOT_IDENTIFIABLE"], words="record a run in which both joints move",
     ),
     "most lost": Case(lambda r: of(r, LOST, *NAMES[:5]), "failed", ["NOT_IDENTIFIABLE"], "only 4"),
-    "all weak": Case(lambda r: alone(r, WEAK), "failed", ["WEAK_EXCITATION"], "no parameter"),
+    "all weak": Case(
+        lambda r: alone(r, WEAK),
+        "failed", ["WEAK_EXCITATION"], "Failed: no parameter could be identified; do not use these",
+    ),
     "all vague": Case(lambda r: alone(r, VAGUE), "failed", ["NOT_SIGNIFICANT"], "no parameter"),
     "vague term of the logs": Case(lambda r: chosen(r, "logs"), "good"),
     "vague term of the user": Case(lambda r: chosen(r, "settings"), codes=["NOT_SIGNIFICANT"]),
@@ -198,6 +201,9 @@ CASES = {
     "physics": Case(
         lambda r: implausible(r, **broken(43.0)), "failed", ["UNKNOWN_CAUSE"], "by 43 standard"
     ),
+    "physics alone": Case(
+        implausible, "failed", ["UNKNOWN_CAUSE"], "Failed: physics forbids these estimates; do"
+    ),
     "a bound without distance": Case(
         lambda r: implausible(r, **broken(None), **predicted(-0.3, 0.99)),
         "failed", ["UNKNOWN_CAUSE", "BROKEN_BOUND"], "joint 1 worse than its mean",
@@ -245,6 +251,7 @@ def test_the_quantile_is_that_of_the_intervals_and_the_delay_that_of_the_torque(
 
 
 TYPED = "algid identify 'a b.csv' -o out"
+LONG = TYPED + 99 * " --loaded run.csv"
 
 
 @pytest.mark.parametrize(
@@ -252,6 +259,7 @@ TYPED = "algid identify 'a b.csv' -o out"
     [
         (HANGING, {"settings": {"command": TYPED}}, f"{TYPED} --zero hanging --force"),
         (HANGING, {"settings": {"command": f"{TYPED} --force"}}, f"{TYPED} --force --zero hanging"),
+        (HANGING, {"settings": {"command": LONG}}, f"{LONG} --zero hanging --force"),
         (HANGING, {"profile": {"zero": "hanging"}}, None),  # said already
         (
             HANGING,

@@ -122,6 +122,7 @@ def test_the_command_prints_json_alone_and_keeps_what_is_there(
     assert done.exit_code == 0, done.output
     assert json.loads(done.stdout)["schema_version"] == 2
     folder = tmp_path / "picking.track"
+    assert f"wrote {folder}\n" in done.stderr
     names = {
         "track.json",
         "track.parquet",
