@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from glob import glob
-from pathlib import Path, PurePath
+from pathlib import Path
 from urllib.parse import unquote
 
 from algid.base.errors import SettingError
@@ -82,16 +82,11 @@ def _logs(source: str, out: str, links: list[str]) -> list[Found]:
         ]
     if path.exists():
         return [(source, path.name, None)]
-    first, _, last = source.partition("**") if "**" in path.parts else (source, "", None)
-    if last and "**" in last:
-        raise SettingError(f"{source}: expected one ** at most; name the folders within it")
+    if "**" in path.parts:
+        raise SettingError(f"{source}: expected no **; name the folder, all logs in it are found")
     found = list[Found]()
-    for match in sorted(glob(first or ".")):  # noqa: PTH207 (it may be absolute)
-        if last is not None:
-            for one, name, trouble in _below(match, out, links):
-                if trouble or PurePath(name).match(last.strip("/") or "*"):
-                    found.append((one, PurePath(name).name, trouble))
-        elif _is_bag(match) or not Path(match).is_dir():
+    for match in sorted(glob(source)):  # noqa: PTH207 (it may be absolute)
+        if _is_bag(match) or not Path(match).is_dir():
             found.append((match, Path(match).name, None))
     if not found:
         raise SettingError(f"{source}: there is no such file, folder or match; check the name")

@@ -267,13 +267,12 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
     kinds: dict[str, Any] = dict.fromkeys(COLUMNS, pl.String)
     kinds |= {"time": pl.Datetime("us", "UTC"), "seconds": pl.Float64, "log_seconds": pl.Float64}
     kinds |= {"reasons": texts, "logs": texts, "sha256": texts, "size": sizes, "changed": times}
-    rows, labels = list[dict[str, Any]](), dict[str, Any]()
-    for one in records:  # text, unless they are numbers in every job
+    rows, texts_of = list[dict[str, Any]](), dict[str, bool]()
+    for one in records:
         for name, label in one.job.labels.items():
-            if type(label) in (str, bool) or name not in labels:
-                labels[name] = pl.String if type(label) in (str, bool) else pl.Float64
-    for name in sorted(labels):
-        kinds[f"label_{name}"] = labels[name]
+            texts_of[name] = texts_of.get(name, False) or type(label) in (str, bool)
+    for name, is_text in sorted(texts_of.items()):
+        kinds[f"label_{name}"] = pl.String if is_text else pl.Float64
     for name in sorted({name for one in records for name in one.estimates}):
         kinds |= {name: pl.Float64, f"{name}_std": pl.Float64, f"{name}_status": pl.String}
     for one in records:
@@ -285,7 +284,7 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
             row["time"] = datetime.fromtimestamp(one.start_ns * 1e-9, UTC)
         row |= {column: [getattr(log, name) for log in one.inputs] for column, name in _OF_LOGS}
         for name, label in one.job.labels.items():
-            row[f"label_{name}"] = str(label) if labels[name] == pl.String else label
+            row[f"label_{name}"] = str(label) if texts_of[name] else label
         for name, numbers in one.estimates.items():
             row |= zip((name, f"{name}_std", f"{name}_status"), numbers, strict=True)
         rows.append(row)

@@ -34,6 +34,7 @@ from algid.readers.column_names import (
     take_apart,
     time_among,
     units_in_names,
+    words,
 )
 from algid.readers.convert import channel_readings, laws_of
 from algid.readers.joints import LOOKED, moving_joints, reading_of
@@ -61,6 +62,8 @@ if TYPE_CHECKING:
 
 INDEX = "__index_level_0__"
 """What pandas calls an index without a name where a frame becomes Arrow or Parquet."""
+_AS_IN_A_PROFILE = words("zero second_angle drive passive signs offsets start end segment")
+"""Of a reading."""
 
 
 @contextmanager
@@ -197,17 +200,9 @@ def open_offered(offered: Offered, profile: Profile) -> TableReader:
         time_unit=clock.unit if offered.clock == "column" else None,
         topics=tuple(filter(None, topics)),
         channels=channels,
-        zero=profile.zero,
-        second_angle=profile.second_angle,
-        drive=profile.drive,
-        passive=profile.passive,
-        signs=profile.signs,
-        offsets=profile.offsets,
         unwrap=(profile.theta1.unwrap, profile.theta2.unwrap),
-        start=profile.start,
-        end=profile.end,
-        segment=profile.segment,
         accepted=profile.accept,
+        **{name: getattr(profile, name) for name in _AS_IN_A_PROFILE},
     )
     notices += of_units
     said = [line[: LIMITS.stated_letters] for line in offered.said[: LIMITS.stated_lines]]
