@@ -26,8 +26,6 @@ class FileLimits:
     columns: int = 4096
     list_cells: int = 64
     """Cells that are taken of a column of lists or a matrix; a joint has one."""
-    joint_cells: int = 64
-    """Joints that are taken of messages whose lists have no names."""
     whole_bytes: int = 1 << 30
     """Of a file that is read as a whole: NumPy, MATLAB, HDF5, JSON lines."""
     reserved_rows: int = 1 << 26
@@ -52,8 +50,6 @@ class FileLimits:
     """Of one such line."""
     unit_letters: int = 40
     """Of a unit that a schema states."""
-    metadata_keys: int = 8192
-    """Of a schema that are looked at for units: each column may have one."""
     name_letters: int = 512
     """Of a name of a column, topic or joint to take apart; a longer one is no joint's."""
     number_letters: int = 400
@@ -80,9 +76,6 @@ class FileLimits:
     """Names of joints in one message."""
     other_joints: int = 32
     """Joints that are not read and are looked at."""
-
-    # bags
-    bag_metadata_bytes: int = 1 << 24
 
     # batches
     name_bytes: int = 1000

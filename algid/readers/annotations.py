@@ -10,10 +10,8 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import islice
 from typing import TYPE_CHECKING
 
-from algid.base.limits import LIMITS
 from algid.base.units import CURRENT, NANOSECONDS, TORQUE, is_foreign, unit_of
 from algid.log import KEY, IntArray, Reading, usual_period
 from algid.notices import Notice, Remedy
@@ -65,13 +63,13 @@ def units_in(metadata: Mapping[str, str], columns: Sequence[str]) -> dict[str, s
     A name is a column's, its stem's (``tau``), or a word for the quantity (``torques``).
     """
     units: dict[str, str] = {}
-    for key, value in islice(metadata.items(), LIMITS.metadata_keys):
+    for key, value in metadata.items():
         named: Mapping[str, object] = {}
         if key.lower() in ("unit", "units"):
             named = _object(value)
         elif match := _UNIT_KEY.fullmatch(key):
             named = {match[1] or match[2]: value}
-        for name, unit in islice(named.items(), LIMITS.metadata_keys):
+        for name, unit in named.items():
             if isinstance(unit, str) and (unit_of(unit) is not None or is_foreign(unit)):
                 units |= dict.fromkeys(_called(name, columns), unit.strip())
     return units
@@ -121,7 +119,7 @@ def in_json_schema(text: str) -> tuple[dict[str, str], list[str]]:
 
 def lines_of(metadata: Mapping[str, str]) -> Iterator[str]:
     """Metadata as lines of text, without the units that `units_in` applies."""
-    for key, value in islice(metadata.items(), LIMITS.metadata_keys):
+    for key, value in metadata.items():
         if key in ("pandas", "ARROW:schema", KEY):
             continue
         known = key.lower() in ("unit", "units") and _object(value)

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from algid.base.errors import LogError
-from algid.base.files import read_start
-from algid.base.limits import LIMITS
+from algid.base.files import read_text
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.notices import Notice
 from algid.readers.flat import as_log_error
@@ -60,7 +59,7 @@ def _files_of_folder(folder: Path) -> tuple[list[Path], tuple[Notice, ...]]:
         from ruamel.yaml import YAML  # of rosbags
 
         try:
-            text = read_start(metadata, LIMITS.bag_metadata_bytes).decode()
+            text = read_text(metadata)
             stated = YAML(typ="safe").load(text)["rosbag2_bagfile_information"]
             names = [Path(str(name)).name for name in stated["relative_file_paths"]]
         except Exception as error:  # what the library raises, and what is not there

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pyarrow as pa
 import pytest
 
@@ -87,18 +86,6 @@ def test_metadata_that_are_no_units_are_left_alone() -> None:
     reading = open_log(pa.table(columns).replace_schema_metadata(metadata)).origin.reading
     assert reading.time_unit is None
     assert [one.told for one in reading.channels.values()] == ["assumed"] * 4
-
-
-@pytest.mark.parametrize(
-    "units", ["s,deg,deg,mNm,Nm", "[s],[deg],[deg],[mN m],[N m]", ",degrees,degrees,(mNm),"]
-)
-def test_a_row_of_units_under_the_header(units: str, tmp_path: Path) -> None:
-    header, below = table("#").split("\n", 1)[1].split("\n", 1)
-    (tmp_path / "log.csv").write_text("\n".join([header, units, below]))
-    log = read_log(tmp_path / "log.csv")
-    assert np.allclose(log.theta, np.radians([1, 2])[:, None] * np.arange(ROWS))
-    assert np.allclose(log.tau, np.array([[0.01], [-10.0]]) * (np.arange(ROWS) + 0.5))
-    assert log.origin.reading.channels["tau1"].unit == "mN m"
 
 
 def test_topics_that_share_no_row_are_refused(tmp_path: Path) -> None:

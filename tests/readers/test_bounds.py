@@ -22,7 +22,6 @@ import pytest
 from algid.base.errors import LogError
 from algid.identification.identify import identify
 from algid.readers import read_log
-from algid.readers.annotations import units_in
 from algid.readers.column_names import Name, take_apart
 from algid.writers import write_log
 from pipelines.mutations import clean_log
@@ -77,13 +76,6 @@ def test_a_table_of_blanks_is_refused_at_its_row(tmp_path: Path) -> None:
     assert len(read_log(csv(tmp_path, *words[:10], *rows[10:]))) == 300
     with pytest.raises(LogError, match=r"could not parse `x` .*; mend that row"):
         read_log(csv(tmp_path, *words[:10], *("1" + " " * 60_000 + "x" for _ in range(100))))
-
-
-def test_keys_of_metadata_are_looked_at_up_to_a_bound(limited: Limited) -> None:
-    assert units_in({"units:a": "deg", "units:q1": "deg"}, ["q1"]) == {"q1": "deg"}
-    limited(metadata_keys=1)
-    assert units_in({"units:a": "deg", "units:q1": "deg"}, ["q1"]) == {}
-    assert units_in({"units": '{"a": "deg", "q1": "deg"}'}, ["q1"]) == {}
 
 
 @pytest.mark.parametrize("step", [1, 10, 999])

@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from algid.base.errors import LogError
@@ -72,21 +71,3 @@ def test_xcdr2_is_refused(tmp_path: Path) -> None:
     write_mcap(tmp_path / "log.mcap", messages)
     with pytest.raises(LogError, match="XCDR2"):
         read_log(tmp_path / "log.mcap")
-
-
-def test_other_joints_that_move_are_told_with_how_far(tmp_path: Path) -> None:
-    names = ("base", "a", "wrist", "b", "hand")
-    swing = 0.3 * np.sin(np.linspace(0, 12, 400))
-    messages = []
-    for row, one in enumerate(sent(LOG)):
-        joints = slice(5 if row % 7 else 4)  # a message may lack a joint
-        (theta1, theta2), (tau1, tau2) = one.position, one.effort
-        position = [0.5, theta1, swing[row], theta2, float("nan")][joints]
-        effort = [0, tau1, 0, tau2, 0][joints]
-        messages.append(replace(one, name=names[joints], position=position, effort=effort))
-    found = read_log(mcap(tmp_path, messages), Profile(joints=("a", "b")))
-    assert np.array_equal(found.theta, LOG.theta)
-    (text,) = (notice.text for notice in found.notices if notice.code == "OTHER_JOINTS")
-    assert "wrist by 0.6 rad" in text
-    assert "base" not in text
-    assert "hand" not in text

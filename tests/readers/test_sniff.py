@@ -128,7 +128,7 @@ def test_titles_may_hold_separators_and_rows_may_break_off() -> None:
 
 
 def test_a_row_of_units_and_comments_above_and_below_it() -> None:
-    dialect = found("# tau1 in mNm\nt,q1,tau1\n,rad,-\n# q1 in deg\n1,2,3\n")
+    dialect = found("# tau1 in mNm\nt,q1,tau1\n,[rad],-\n# q1 in deg\n1,2,3\n")
     assert (dialect.schema.field("q1").metadata, dialect.skip) == ({b"unit": b"rad"}, 4)
     assert dialect.schema.field("tau1").metadata is None
     assert dialect.said == ("tau1 in mNm", " q1 in deg")

@@ -351,7 +351,7 @@ def _paths(layout: MessageLayout, joints: Sequence[str]) -> Iterator[str]:
             continue
         if not numbers.count:
             yield f"{name} (empty)"
-        places = range(min(numbers.count, LIMITS.joint_cells))
+        places = range(min(numbers.count, LIMITS.list_cells))
         for place in joints if numbers.count == len(joints) else places:
             yield f"{name}[{place}]"
 
