@@ -51,7 +51,7 @@ from algid.estimators.fit import Fit, alone, solved_anew
 from algid.estimators.prediction import PredictionScore
 from algid.estimators.robust import unshrunk
 from algid.identification.by_likelihood import Fitted
-from algid.identification.known import FAR, contradicting
+from algid.identification.known import FAR, contradicting, gain_notes
 from algid.identification.passes import problem_of
 from algid.identification.recordings import Recording
 from algid.identification.series import predictor_of_fit
@@ -331,15 +331,7 @@ def fit_notes(fit: results.FitSummary) -> Iterator[Notice]:
         low, high = fit.repeatability.ci95
         numbers = {"masses": masses, "std": fit.repeatability.std, "low": low, "high": high}
         yield Notice("REPEATABILITY", numbers={"case": "payload"} | numbers)
-    gain = fit.torque_gain
-    if gain is not None and (gain.estimate is None or gain.ci95 is None):
-        yield Notice("TORQUE_GAIN", numbers={"case": "unknown"})
-    elif gain is not None and gain.ci95 is not None:
-        numbers = {"gain": gain.estimate, "low": gain.ci95[0], "high": gain.ci95[1]}
-        gears = Remedy(
-            {"tau1.torque_constant": None, "tau2.torque_constant": None}, "set them, or gear_ratio"
-        )
-        yield Notice("TORQUE_GAIN", numbers={"case": "known"} | numbers, remedies=(gears,))
+    yield from gain_notes(fit)
 
 
 def _of_hold(hold: results.TorqueHold) -> Iterator[Notice]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from math import isclose
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
@@ -28,10 +28,10 @@ from algid.model import (
     phasor_of,
     without_delay,
 )
-from algid.notices import Notice
+from algid.notices import Notice, Remedy
 from algid.options import flag
 from algid.physics.effort import absent
-from algid.results import LogSummary, Result
+from algid.results import FitSummary, LogSummary, Result
 from algid.settings import DEFAULTS, Settings
 from algid.signals.shift import TorqueShift
 
@@ -243,16 +243,34 @@ def payload_length(result: Result) -> tuple[float, float] | None:
     return l1.estimate, l1.std
 
 
-def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice, ...]:
-    """Notices of given lengths that contradict those that a result was made with or identified.
+def gain_notes(fit: FitSummary | None) -> Iterator[Notice]:
+    """What a payload of known mass says of the torques' gain, and so of all masses of a result."""
+    gain = None if fit is None else fit.torque_gain
+    if gain is None:
+        return
+    if gain.estimate is None or gain.ci95 is None:
+        yield Notice("TORQUE_GAIN", numbers={"case": "unknown"})
+        return
+    # a gain that is off by what scales, as rulers, differ is none
+    off = abs(gain.estimate - 1) > max(FAR * (gain.std or 0.0), SAME_LENGTH)
+    gears = Remedy(
+        {"tau1.torque_constant": None, "tau2.torque_constant": None}, "set them, or gear_ratio"
+    )
+    low, high = gain.ci95
+    numbers = {"gain": gain.estimate, "low": low, "high": high, "case": "off" if off else "known"}
+    yield Notice("TORQUE_GAIN", numbers=numbers, remedies=(gears,))
 
-    What it identified are the payload's lengths, or l1 = g k1 / k2.
+
+def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice, ...]:
+    """What is known against a result: the gain of its torques, and given lengths.
+
+    These contradict those that it was made with, or identified: the payload's, or l1 = g k1 / k2.
     """
     stated, of_arm = given_lengths(result), by_constants(result)
     identified = {name: (one.estimate, one.std) for name, one in result.payload.items()}
     if of_arm is not None:
         identified["l1"] = of_arm[:2]
-    notices = []
+    notices = [one for one in gain_notes(result.fit) if not one.note]
     for name, given in lengths.items():
         numbers = {"name": name, "given": given}
         if name in stated:

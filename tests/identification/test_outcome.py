@@ -250,7 +250,10 @@ def test_repeatability_and_gain_are_told_in_numbers() -> None:
     )
     gain = Estimate(estimate=1.25, std=0.01, ci95=(1.23, 1.27), unit="1")
     (one,) = notes(torque_gain=gain)
-    assert "the torques have to be multiplied by 1.25 (95 %: 1.23 to 1.27), and" in one.text
+    assert (one.key, one.note) == ("TORQUE_GAIN:off", False)
+    assert "the known payload says to multiply by 1.25 (95 %: 1.23 to 1.27), and" in one.text
+    (one,) = notes(torque_gain=Estimate(estimate=1.02, std=0.01, ci95=(1.0, 1.04), unit="1"))
+    assert (one.key, one.note) == ("TORQUE_GAIN:known", True)
     (one,) = notes(torque_gain=unknown("1"))
     assert one.code == "TORQUE_GAIN"
 

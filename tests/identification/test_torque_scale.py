@@ -10,11 +10,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 import pytest
 
+import algid
 from algid.arm import FloatArray, with_payload
 from algid.base.errors import SettingError
 from algid.estimators import refined
@@ -63,7 +65,7 @@ def test_a_known_payload_tells_the_gain_of_the_torques() -> None:
         assert found.estimate * gain.estimate == pytest.approx(true, rel=0.03)
     l1 = result.payload["l1"]  # no gain changes a length
     assert l1.estimate == pytest.approx(CASE.arm.l1, rel=0.03)
-    assert any("have to be multiplied by 0.09" in note for note in result.notes)
+    assert any("says to multiply by 0.09" in warning for warning in result.warnings)
 
 
 def test_without_a_payload_there_is_no_gain_to_tell() -> None:
@@ -145,3 +147,22 @@ def test_a_unit_that_an_earlier_result_contradicts_is_not_advised() -> None:
     earlier = identify(log_of(1e3), report=False)
     result = identify(None, log_of(1e3, loaded=True), parameters=earlier, report=False)
     assert [one.remedies for one in heavy(result)] == [()]
+
+
+def test_the_gain_that_a_known_payload_shows_is_told_by_all_that_use_the_arm() -> None:
+    unloaded, loaded = (
+        algid.Log.from_arrays(log.t, log.theta, 0.8 * log.tau)
+        for log in algid.synthesise("case1", duration=3.0, torque="wide", torque_noise=1e-3)
+    )
+    weak: dict[str, Any] = {"estimator": "weak", "model": "plain"}
+    arm = algid.identify(unloaded, loaded, payload_mass=CASE.payload, **weak)
+    assert arm.verdict.grade == "reservations"
+    heard = [
+        arm.notices,
+        algid.identify(None, loaded, parameters=arm, **weak).notices,
+        algid.track(loaded, arm).notices,
+        algid.export(arm, "urdf").warnings,
+    ]
+    for notices in heard:
+        (gain,) = (one.numbers["gain"] for one in notices if one.key == "TORQUE_GAIN:off")
+        assert gain == pytest.approx(1.25, rel=0.02)
