@@ -66,7 +66,7 @@ CAUSES = (
 def judge(result: Result) -> Verdict:
     """The verdict on `result`."""
     failure, reasons = _failure(result), list[Notice]()
-    for one in _reasons(result, failed=failure is not None):
+    for one in _reasons(result):
         if one not in reasons and one.text != failure:
             reasons.append(one)
     notes, command = notes_of(result.notices), _command(result, reasons)
@@ -137,12 +137,12 @@ def _explained(found: TorquePrediction, joint: int) -> Notice:
     return Notice("LITTLE_EXPLAINED", numbers=numbers)
 
 
-def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
+def _reasons(result: Result) -> Iterator[Notice]:
     """Reasons for doubt in a result, the weightiest first."""
     doubts, fit = warnings_of(result.notices), result.fit
     causes = [one for cause in CAUSES for one in of_codes(doubts, cause)]
     implausible = any(one.status == "IMPLAUSIBLE" for one in result.estimates.values())
-    if failed and not causes and (implausible or _unexplained(result)):
+    if not causes and (implausible or _unexplained(result)):  # it failed
         yield Notice("UNKNOWN_CAUSE")
     yield from causes
     for one in of_codes(doubts, "SATURATED_EFFORT", "CLIPPED_TORQUE"):

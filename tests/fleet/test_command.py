@@ -1,12 +1,10 @@
-"""`algid report` of a batch as its users call it, on what `algid batch` writes."""
+"""`algid report` of a batch as its users call it, on a table as `algid batch` writes it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from concurrent.futures import Future
-from functools import partial
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import polars as pl
 import pytest
@@ -14,75 +12,46 @@ from click.testing import CliRunner
 from scipy.stats import norm
 
 from algid.api.report import report
-from algid.base.stores import open_store
-from algid.batches.discover import jobs_of
-from algid.batches.job import Task
-from algid.batches.jobs import JobRecord, JobStatus, stat_of
-from algid.batches.run import Batch
+from algid.batches.jobs import Job, JobRecord, JobStatus, jobs_frame
 from algid.fleet.history import history_of
 from algid.fleet.page import overview
-from algid.settings import Settings
 from tests.cli.commands import app
 from tests.report.pages import Page, named, typed
 
 START = 1_700_000_000 * 10**9
 DAY = 86_400 * 10**9
-StoredRecords = tuple[str, int, dict[str, tuple[float, float, str]]]
+Known = tuple[str, int, dict[str, tuple[float, float, str]]]
 """Robot, first stamp in ns and estimates of a job."""
 
 
-class Finished:
-    """Ends every job at once, with what is known of it."""
-
-    def __init__(self, known: Mapping[str, StoredRecords]) -> None:
-        self.known = known
-
-    def submit(self, _fn: Callable[..., Any], task: Task) -> Future[Any]:
-        future: Future[Any] = Future()
-        _, start_ns, estimates = self.known[task.job.name]
-        inputs = tuple(map(stat_of, task.job.logs))
-        future.set_result(
-            JobRecord(
-                task.job, JobStatus.OK, "", task.basis, inputs, {}, "", 1.0, start_ns, 10.0,
-                "refined",
-                estimates,
-            )
-        )  # fmt: skip
-        return future
-
-
-def _written(folder: Path, known: Mapping[str, StoredRecords]) -> Path:
-    """A batch of such jobs, whose payload is labelled 0.5 kg."""
+def written(folder: Path, known: Mapping[str, Known]) -> Path:
+    """The table of a batch of such jobs, whose payload is labelled 0.5 kg."""
+    records = []
+    for name, (robot, start_ns, estimates) in known.items():
+        job = Job(name, robot=robot, labels={"payload": 0.5})
+        record = JobRecord(job, JobStatus.OK, "", "", (), {}, "")
+        records.append(replace(record, start_ns=start_ns, estimates=estimates))
     folder.mkdir(exist_ok=True)
-    (folder / "a.csv").write_text("no log")
-    lines = ["name,logs,robot,payload"]
-    for name, (robot, _, _) in known.items():
-        lines.append(f"{name},a.csv,{robot},0.5")
-    (folder / "manifest.csv").write_text("\n".join(lines))
-    jobs = jobs_of([str(folder / "manifest.csv")], str(folder))
-    task_of = partial(Task, settings=Settings(), out=str(folder))
-    submit = Finished(known).submit
-    ended = Batch(open_store(str(folder)), task_of, submit, 1, lambda *_: None).run(jobs)
-    assert [record.status for record in ended.records] == [JobStatus.OK] * len(known)
+    jobs_frame(records).write_parquet(folder / "jobs.parquet")
     return folder
 
 
-def _batch(folder: Path, robots: int = 2, logs: int = 10, start_ns: int = START) -> Path:
-    """A batch whose first robot's k6 doubles within its logs, one a day."""
-    known: dict[str, StoredRecords] = {}
-    for robot in range(robots):
-        for day in range(logs):
+def batch(folder: Path) -> Path:
+    """A batch whose first robot's k6 doubles within its ten logs, one a day."""
+    known: dict[str, Known] = {}
+    for robot in range(2):
+        for day in range(10):
             estimates = {
                 "k1": (1.0, 0.01, "OK"),
-                "k6": (1.0 + (day / logs if robot == 0 else 0.0), 0.01, "OK"),
+                "k6": (1.0 + (day / 10 if robot == 0 else 0.0), 0.01, "OK"),
                 "m_p": (0.5 if robot or day else 0.9, 0.001, "OK"),
             }
-            known[f"r{robot}/{day}"] = f"r{robot}", start_ns + day * DAY, estimates
-    return _written(folder, known)
+            known[f"r{robot}/{day}"] = f"r{robot}", START + day * DAY, estimates
+    return written(folder, known)
 
 
 def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["report", str(_batch(tmp_path)), "-o", str(tmp_path / "page")])
+    done = CliRunner().invoke(app, ["report", str(batch(tmp_path)), "-o", str(tmp_path / "page")])
     assert done.exit_code == 0, done.output
     assert "2 robots, 20 logs: 1 drift and 1 payload" in done.stdout
     assert "1 payload unlike the label: m_p of r0/0" in " ".join(done.stdout.split())
@@ -93,7 +62,7 @@ def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
 
 
 def test_every_log_is_a_point_with_its_interval(tmp_path: Path) -> None:
-    _batch(tmp_path)
+    batch(tmp_path)
     history = history_of(tmp_path / "jobs.parquet")
     jobs = history.jobs.filter(robot="r0")
     plot = overview(history)
@@ -113,9 +82,12 @@ def test_every_log_is_a_point_with_its_interval(tmp_path: Path) -> None:
 
 
 def test_the_page_is_two_tables_and_a_figure(tmp_path: Path) -> None:
-    batch = _batch(tmp_path / "batch[1]")
     heard = list[tuple[str, int, int]]()
-    report([batch], out=tmp_path / "page", progress=lambda *step: heard.append(step))
+    report(
+        [batch(tmp_path / "batch[1]")],
+        out=tmp_path / "page",
+        progress=lambda *step: heard.append(step),
+    )
     assert heard == [("following", 0, 2), ("following", 1, 2)]
     page = Page((tmp_path / "page/fleet.html").read_text(encoding="utf-8"))
     assert list(page.tables) == ["Findings", "Robots"]
@@ -125,7 +97,7 @@ def test_the_page_is_two_tables_and_a_figure(tmp_path: Path) -> None:
 
 
 def test_a_name_that_attacks_is_text(tmp_path: Path) -> None:
-    _written(tmp_path, {"javascript:alert(1)": ("<b>r</b>", START, {"k1": (1.0, 0.01, "OK")})})
+    written(tmp_path, {"javascript:alert(1)": ("<b>r</b>", START, {"k1": (1.0, 0.01, "OK")})})
     assert CliRunner().invoke(app, ["report", str(tmp_path)]).exit_code == 0
     page = (tmp_path / "fleet.html").read_text(encoding="utf-8")
     assert 'href="javascript' not in page
