@@ -52,7 +52,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "results": room(
         "criteria errors files log model names notices options physics settings significance text",
         "numpy polars pydantic"),
-    "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
+    "synth": room("arm errors files limits log options progress", "numpy pydantic scipy"),
     "table4": room("arm estimators limits log model names results synth"),
     "writers": room("arrow errors files log ros2", "mcap numpy polars pyarrow"),
     "readers": room(

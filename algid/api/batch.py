@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
@@ -20,12 +20,9 @@ from algid.base.text import visible
 from algid.options import Option, flag
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
-
     from algid.base.progress import Progress
     from algid.batches.jobs import Job, JobRecord
     from algid.batches.run import Batched
-    from algid.profile import Profile
     from algid.settings import Settings
 Size = Annotated[str | int, Option(check=Annotated[ByteSize, Field(ge=1 << 29)])]
 Part = Annotated[str, Field(pattern="^[0-9]{1,9}/[0-9]{1,9}$")]
@@ -117,10 +114,13 @@ def batch(
     >>> done.counts
     {'ok': 1}
     """
-    from algid.base.stores import absolute, open_store, shown
+    from algid.base.runtime import cores
+    from algid.base.stores import absolute, is_url, open_store, shown
     from algid.batches.discover import jobs_of
     from algid.batches.job import Task
+    from algid.batches.jobs import FOLDER
     from algid.batches.run import Batch, locked, stopped_by_signals, sweep
+    from algid.batches.workers import Workers
     from algid.identification.prior import statement_of
 
     if isinstance(sources, str | Path):
@@ -148,10 +148,7 @@ def batch(
             asked = asked.but(prior=absolute(asked.prior))
         names, place = [absolute(source) for source in names], absolute(place)
 
-    @cache  # each file once
-    def profile_of(file: str) -> Profile | None:
-        """That of a manifest's entry with the options over it."""
-        return meant(file, settings_of(None, options)[1])
+    profile_of = cache(lambda file: meant(file, of_profile))  # each file of a manifest once
 
     def task_of(job: Job) -> Task:
         of_job = said
@@ -166,9 +163,7 @@ def batch(
         if progress is not None:
             progress(f"{last.job.name[:50]}: {last.status.value}", done, total)
 
-    def look() -> list[Job]:
-        return jobs_of(names, place, "logs" if known is None else "loaded", links)
-
+    look = partial(jobs_of, names, place, "logs" if known is None else "loaded", links)
     jobs = [] if watch else look()
     if not (jobs or watch):
         raise SettingError(
@@ -180,20 +175,26 @@ def batch(
             expected = f"expected 1/N to N/N, and no {flag('watch')}"
             raise SettingError(f"{flag('part')}: {expected}, found {part!r:.60}")
         jobs = jobs[number - 1 :: count]
-    with locked(place, shared=part is not None):
+    with ExitStack() as stack:
+        stack.enter_context(locked(place, shared=part is not None))
         sweep(store)
-        try:
-            with _workers(place, scheduler, workers, memory_limit, timeout) as (submit, slots):
-                running = Batch(
-                    *(store, task_of, submit, slots, ended_job), shared=part is not None
-                )
-                with stopped_by_signals(running.stop):
-                    if watch:
-                        ended = running.watch(look, retry_failed, complain)
-                    else:
-                        ended = running.run(jobs, retry_failed)
-        finally:
-            sweep(store)
+        stack.callback(sweep, store)
+        if scheduler is None:
+            size: Any = memory_limit  # a number by now
+            count = workers or cores()
+            submit = stack.enter_context(Workers(count, size, timeout)).submit
+            slots = 2 * count
+        else:
+            from algid.batches.cluster import cluster
+
+            folder = None if is_url(place) else Path(place, FOLDER)
+            submit, slots = stack.enter_context(cluster(scheduler, folder, timeout))
+        running = Batch(store, task_of, submit, slots, ended_job, shared=part is not None)
+        stack.enter_context(stopped_by_signals(running.stop))
+        if watch:
+            ended = running.watch(look, retry_failed, complain)
+        else:
+            ended = running.run(jobs, retry_failed)
     stopped = running.stop.is_set() and not watch
     return replace(ended, out=shown(place), interrupted=stopped, links=links or ())
 
@@ -229,24 +230,3 @@ def answer(ended: Batched, _given: Mapping[str, Any]) -> Answer:
     elif ended.interrupted:
         ended_as = Exit.STOPPED
     return Answer(lines, complaints=complaints, exit=ended_as)
-
-
-@contextmanager
-def _workers(
-    out: str, scheduler: str | None, workers: int | None, memory_limit: Any, timeout: float
-) -> Iterator[tuple[Callable[..., Future[Any]], int]]:
-    """What hands calls to workers, and how many at once; they end with the block."""
-    from algid.base.runtime import cores
-    from algid.base.stores import is_url
-    from algid.batches.jobs import FOLDER
-    from algid.batches.workers import Workers
-
-    if scheduler is None:
-        count = workers or cores()
-        with Workers(count, memory_limit, timeout) as executor:
-            yield executor.submit, 2 * count
-        return
-    from algid.batches.cluster import cluster
-
-    with cluster(scheduler, None if is_url(out) else Path(out, FOLDER), timeout) as both:
-        yield both

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator
+from pydantic import BeforeValidator
 
 from algid.api import Answer
 from algid.api.options import CASES, Folder, Seed, options_of, verb
@@ -24,6 +24,7 @@ from algid.profile import parts_of
 from algid.synth import run
 from algid.synth.cases import load_case
 from algid.synth.excitation import SampledTorque, Torque, wide_multi_sine
+from algid.synth.follow import read_plan
 from algid.synth.sensors import Sensors, record, sample_times
 from algid.synth.simulator import HANGING, simulate
 from algid.writers import write_log
@@ -36,24 +37,17 @@ FIRST_YEAR, LAST_YEAR = 1970, 2037
 """Of a log's start: the stamps in messages of ROS 2 end in January 2038."""
 
 
-def _moment(given: object) -> datetime:
-    """A date, in UTC where it names no zone."""
+def _moment(given: object) -> int:
+    """Ns from 1970 to a date, in UTC where it names no zone."""
     start = datetime.fromisoformat(str(given))
     if not FIRST_YEAR <= start.year <= LAST_YEAR:
         raise ValueError(f"expected a date from {FIRST_YEAR} to {LAST_YEAR}")
-    return start.replace(tzinfo=start.tzinfo or UTC)
+    return int(start.replace(tzinfo=start.tzinfo or UTC).timestamp()) * 10**9
 
 
 def _pairs(given: Any) -> Any:
     """Pairs out of S=KG,…."""
     return [part.split("=") for part in given.split(",")] if isinstance(given, str) else given
-
-
-def _increasing(schedule: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    times = [time for time, _ in schedule]
-    if not times or times != sorted(set(times)):
-        raise ValueError("expected increasing times like 2=0.05,4=0")
-    return schedule
 
 
 _Angle = Annotated[float, within(PHYSICAL.angle)]
@@ -66,11 +60,7 @@ State = Annotated[
 ]
 Schedule = Annotated[
     Sequence[tuple[float, float]] | str,
-    Option(
-        check=Annotated[
-            list[tuple[_Time, _Mass]], BeforeValidator(_pairs), AfterValidator(_increasing)
-        ]
-    ),
+    Option(check=Annotated[list[tuple[_Time, _Mass]], BeforeValidator(_pairs)]),
 ]
 Moment = Annotated[datetime | date | str, Option(check=Annotated[Any, BeforeValidator(_moment)])]
 Noise = Annotated[float, within(PHYSICAL.noise)]
@@ -197,48 +187,33 @@ def synthesise(
     >>> unloaded.theta.shape, loaded.origin.truth.payload
     ((2, 2001), 0.3515)
     """
-    own = locals()
+    own, options = locals(), options_of(synthesise)
+    fixed, why = list[str](), "the example is always the same"
     if case == "example":
-        for name, one in options_of(synthesise).items():
-            if name not in ("case", "out", "force") and own[name] not in (None, one.default):
-                raise SettingError(f"{one.flag}: the example is always the same; leave it out")
-        names = [*(f"{name}.csv" for name in LOGS), PROFILE]
-        simulated = example_logs
+        fixed = [name for name in options if name not in ("case", "out", "force")]
+    elif motion is not None:
+        fixed = ["initial", "payload_schedule", "torque"]
+        why = "a motion starts where it was planned and carries one payload"
+    for name in fixed:
+        if own[name] not in (None, options[name].default):
+            raise SettingError(f"{flag(name)}: {why}; leave it out")
+    if case == "example":
+        names, simulated = [*(f"{name}.csv" for name in LOGS), PROFILE], example_logs
     else:
-        arm = load_case(str(case))
-        of_sensors = {one.name: own.get(one.name) for one in fields(Sensors)}
-        if start_time is not None:
-            of_sensors["start_ns"] = int(start_time.timestamp()) * 10**9  # type: ignore[union-attr]
+        arm, plan = load_case(str(case)), None if motion is None else read_plan(Path(motion))
+        duration = duration or (1.0 if plan is None else plan.duration)
+        given = own | {"start_ns": start_time}
+        of_sensors = {one.name: given[one.name] for one in fields(Sensors)}
         set_of_them = {name: value for name, value in of_sensors.items() if value is not None}
         measured = replace(sensors or Sensors(), **set_of_them)
-        plan = None
-        if motion is not None:
-            from algid.synth.follow import read_plan
-
-            for name in ("initial", "payload_schedule", "torque"):
-                if own[name] is not None:
-                    raise SettingError(
-                        f"{flag(name)}: a motion starts where it was planned and "
-                        "carries one payload; leave it out"
-                    )
-            plan = read_plan(Path(motion))
-            duration = duration or plan.duration
-        duration = duration or 1.0
-        samples, (least, most) = round(rate * duration) + 1, PHYSICAL.samples
-        if not least <= samples <= most:
-            raise SettingError(
-                f"{flag('duration')}: {duration:g} s at {flag('rate')} {rate:g} Hz are "
-                f"{samples:.3g} samples; expected {least:g} to {most:g}"
-            )
-        recording = run.Acquisition(rate, duration, sensors=measured)
-        if initial is not None:
-            recording = replace(recording, initial=initial)  # type: ignore[arg-type]  # numbers
-        drive = _drive(arm, "case" if torque is None else torque, torque_hold, recording)
+        start: Any = initial or run.Acquisition.initial
+        recording = run.Acquisition(rate, duration, start, measured)
+        drive = plan or _drive(arm, "case" if torque is None else torque, torque_hold, recording)
         roles = ["unloaded", "loaded"][: 1 + bool(arm.payload)]
         if payload_schedule is not None:
             roles = ["schedule"]
         names = [f"{arm.name}-{role}.{format}" for role in roles]
-        said: Any = (arm, plan or drive, recording, progress, payload_schedule)
+        said: Any = (arm, drive, recording, progress, payload_schedule)
         simulated = partial(run.synthesise, *said)
     files = [] if out is None else [Path(out) / name for name in names]
     for file in files:

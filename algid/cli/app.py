@@ -12,6 +12,7 @@ import os
 import shlex
 import sys
 import traceback
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib import import_module
@@ -27,7 +28,7 @@ from algid.base.faults import fault
 from algid.base.text import lines_of
 from algid.cli.output import complain, progress, remark, shown
 from algid.guard import TRACEBACK
-from algid.options import ADVANCED, ARGUMENTS, EVERYDAY, VALUES, Option, refuse_moved
+from algid.options import ADVANCED, ARGUMENTS, VALUES, Option, refuse_moved
 
 COMMANDS: Mapping[str, str] = {
     "inspect": "inspect",
@@ -58,14 +59,14 @@ class Command(click.Command):
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write arguments and options."""
-        panels: dict[str, list[tuple[str, str]]] = {ARGUMENTS: [], EVERYDAY: [], ADVANCED: []}
-        for one in self.get_params(ctx):
-            known = self.taken.get(str(one.name), Option(panel=ADVANCED))  # click's own is --help
+        panels = defaultdict[str, list[tuple[str, str]]](list)
+        for one in self.get_params(ctx):  # arguments, everyday, advanced, and click's own --help
+            known = self.taken.get(str(one.name), Option(panel=ADVANCED))
             label, text = one.get_help_record(ctx) or (str(one.metavar), "")
             panels[known.panel].append((label, text or known.help))
-        for panel in filter(panels.get, panels):
+        for panel, rows in panels.items():
             with formatter.section(panel):
-                formatter.write_dl(panels[panel])
+                formatter.write_dl(rows)
 
 
 def listed(name: str) -> str:

@@ -8,8 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.base.errors import SettingError
+from algid.base.limits import PHYSICAL
 from algid.base.progress import Progress
 from algid.log import Log, Truth
+from algid.options import flag
 from algid.synth.cases import Case
 from algid.synth.excitation import Hold, SampledTorque, Torque, no_torque, wide_multi_sine
 from algid.synth.follow import Reference, follow
@@ -27,6 +30,14 @@ class Acquisition:
     duration: float = 1.0
     initial: tuple[float, float, float, float] = (float(HANGING[0]), float(HANGING[1]), 0.0, 0.0)
     sensors: Sensors = field(default_factory=Sensors)
+
+    def __post_init__(self) -> None:
+        samples, (least, most) = round(self.rate * self.duration) + 1, PHYSICAL.samples
+        if not least <= samples <= most:
+            raise SettingError(
+                f"{flag('duration')}: {self.duration:g} s at {flag('rate')} {self.rate:g} Hz are "
+                f"{samples:.3g} samples; expected {least:g} to {most:g}"
+            )
 
 
 def excitation(case: Case, name: str) -> Torque:
@@ -68,22 +79,21 @@ def synthesise(
 
     Raises
     ------
-    ValueError
-        If the times do not increase or a payload is negative.
+    SettingError
+        If the times do not increase.
     """
     runs: dict[str, Sequence[tuple[float, float]]] = {"unloaded": [(0.0, 0.0)]}
     if case.payload:
         runs["loaded"] = [(0.0, case.payload)]
     changes: tuple[tuple[float, float], ...] = ()
     if schedule is not None:
-        table = np.array(schedule, dtype=np.float64).reshape(-1, 2)
-        late, masses = np.diff(table[:, 0]), table[:, 1]
-        if not np.all(np.isfinite(table)) or np.any(late <= 0) or np.any(masses < 0):
-            raise ValueError(
-                "schedule must hold increasing times and payloads of 0 or more, "
-                f"got {list(schedule)}"
+        changes = tuple((float(time), float(mass)) for time, mass in schedule)
+        times = [time for time, _ in changes]
+        if not times or times != sorted(set(times)):
+            raise SettingError(
+                f"{flag('payload_schedule')}: expected increasing times like 2=0.05,4=0, found "
+                f"{list(schedule)}"
             )
-        changes = tuple((time, mass) for time, mass in table.tolist())
         runs = {"schedule": [(0.0, 0.0), *changes]}
     logs = []
     for place, (role, payloads) in enumerate(runs.items()):

@@ -41,18 +41,8 @@ class Sensors:
 
 
 def sample_times(rate: float, duration: float, sensors: Sensors) -> FloatArray:
-    """Sampling instants (N,) in s, on whole nanoseconds, with jitter and without dropped samples.
-
-    Raises
-    ------
-    ValueError
-        If rate or duration leave fewer than two samples.
-    """
+    """Instants of samples (N,) in s, on whole nanoseconds, with jitter, less dropped ones."""
     count = round(rate * duration) + 1
-    if count < 2:
-        raise ValueError(
-            f"rate and duration must give at least two samples, got {rate} Hz for {duration} s"
-        )
     rng = np.random.default_rng([sensors.seed, 1])
     t = np.arange(count) / rate
     if sensors.jitter > 0:

@@ -108,7 +108,7 @@ def test_a_bad_log_fails_alone_and_the_table_has_a_row_a_job(logs: Path) -> None
 
 
 def test_what_is_run_anew_is_told(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("algid.api.batch._workers", lambda *_: nullcontext((Here().submit, 1)))
+    monkeypatch.setattr("algid.batches.workers.Workers", lambda *_: nullcontext(Here()))
     quick: Any = {"estimator": "weak", "model": "plain", "report": False}
     out = logs.parent / "out"
     assert algid.batch(logs, out, **quick).anew == {}
@@ -138,7 +138,7 @@ def test_a_changed_prior_is_another_setting(logs: Path) -> None:
 def test_a_changed_file_of_torques_is_another_log(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("algid.api.batch._workers", lambda *_: nullcontext((Here().submit, 1)))
+    monkeypatch.setattr("algid.batches.workers.Workers", lambda *_: nullcontext(Here()))
     log = pl.read_parquet(made / "r1/a-unloaded.parquet")
     angles, torques = tmp_path / "arm.csv", tmp_path / "torques.txt"
     log.select("t", "theta1", "theta2").write_csv(angles)
@@ -187,7 +187,7 @@ def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(
 def test_parts_share_an_output_and_its_table_is_of_all(
     logs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("algid.api.batch._workers", lambda *_: nullcontext((Here().submit, 1)))
+    monkeypatch.setattr("algid.batches.workers.Workers", lambda *_: nullcontext(Here()))
     out = logs.parent / "out"
     quick: Any = {"estimator": "weak", "model": "plain", "report": False}
     with locked(str(out), shared=True):  # as another part holds it

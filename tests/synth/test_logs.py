@@ -72,7 +72,7 @@ def test_a_rehearsal_overwrites_no_log_either(tmp_path: Path) -> None:
             (["case1", "--payload-schedule", text], f"--payload-schedule: {why}")
             for text, why in (
                 ("1=2=3", "tuple should have at most 2 items"),
-                ("2=1,1=0", "expected increasing times like 2=0.05,4=0, found '2=1,1=0'"),
+                ("2=1,1=0", "expected increasing times like 2=0.05,4=0, found [(2.0, 1.0), "),
                 ("1=-1", "expected greater than or equal to 0, found '-1'"),
                 ("nan=1", "expected less than or equal to 1000000, found 'nan'"),
                 ("", ""),

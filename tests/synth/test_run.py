@@ -53,15 +53,11 @@ def test_an_object_is_grasped_and_let_go_without_a_step() -> None:
     [
         [(1.0, 0.1), (1.0, 0.2)],
         [(2.0, 0.1), (1.0, 0.2)],
-        [(1.0, -0.1)],
-        [(1.0, np.inf)],
-        [(np.nan, 0.1)],
+        [],
     ],
 )
 def test_a_schedule_that_makes_no_sense_is_refused(schedule: list[tuple[float, float]]) -> None:
-    with pytest.raises(
-        ValueError, match="schedule must hold increasing times and payloads of 0 or more, got "
-    ):
+    with pytest.raises(SettingError, match=r"^--payload-schedule: expected increasing times"):
         synthesise(CASE, WAVE, SHORT, schedule=schedule)
 
 
