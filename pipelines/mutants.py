@@ -141,20 +141,21 @@ def tests_of(room: str) -> list[str]:
 def chosen(mutant: Mutant, seconds: dict[str, float], lines: dict[str, list[str]]) -> list[str]:
     """Of the room's tests those that reach the mutant's lines first, then those that reach its
     file, then those beside them: what is reached on import, by a fixture or by another process is
-    told of one test or of none.
+    told of one test or of none. The cases of a test take turns with other tests.
     """
     reach = {test for line in mutant.lines for test in lines.get(str(line), ())}
     file = {test for tests in lines.values() for test in tests}
     beside = {test.partition("::")[0] for test in file}
+    order, cases = list[tuple[bool, bool, bool, int, float, str]](), Counter[str]()
+    for test in sorted(seconds, key=seconds.__getitem__):
+        own, name = test.partition("::")[0], test.partition("[")[0]
+        far = (test not in reach, test not in file, own not in beside, cases[name])
+        order.append((*far, seconds[test], test))
+        cases[name] += 1
     kept: list[str] = []
     spent = 0.0
-
-    def far(test: str) -> tuple[bool, bool, bool, float]:
-        own = test.partition("::")[0]
-        return test not in reach, test not in file, own not in beside, seconds[test]
-
-    for test in sorted(seconds, key=far):
-        spent += seconds[test]
+    for *_, took, test in sorted(order):
+        spent += took
         if kept and spent > BUDGET:
             break
         kept.append(test)

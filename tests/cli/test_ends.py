@@ -145,6 +145,11 @@ def test_a_profile_that_is_there_is_refused_before_the_log_is_read(tmp_path: Pat
     done = call("inspect", tmp_path / "absent.csv", "--write-profile", tmp_path)
     assert (done.code, done.out) == (2, "")
     assert "algid.toml: exists already" in done.err
+    log, new = tmp_path / "log.csv", tmp_path / "new.toml"
+    log.write_text("t,a\n0,1\n1,2\n")  # which nothing reads without a profile
+    done = call("inspect", log, "--write-profile", new)
+    again = f"algid inspect {log} --profile {new}"
+    assert (done.code, done.err) == (0, f"wrote {new}; edit it, then try: {again}\n")
 
 
 def synthetic(folder: Path, *flags: str, role: str = "unloaded") -> pl.DataFrame:

@@ -195,6 +195,7 @@ def test_a_bare_result_still_makes_a_page(tmp_path: Path, result: Result) -> Non
     bare = tmp_path / "bare.algid"
     shown = written(bare, result.model_copy(update={"fit": None, "more_logs": []}))
     assert shown.figures == {}
+    assert {one.name for one in bare.iterdir()} == {"report.html", "report.md", "result.json"}
     assert 'class="first"' in shown.text  # nothing stands beside the numbers
     with pytest.raises(ResultError, match="cannot read it"):
         write_pages(tmp_path)
