@@ -403,8 +403,8 @@ def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: P
     assert plot is not None
     panels = [one["text"] for one in plot.layout["annotations"]]
     assert panels == ["<b>r1: k1, kg m²</b>", "<b>r1: k3, kg m²</b>"]
-    lines = [one["x0"] for one in plot.layout["shapes"]]
-    assert lines == [pytest.approx((START + timedelta(days=80)).timestamp() * 1000)] * 2
+    lines = [one[end] for one in plot.layout["shapes"] for end in ("x0", "x1")]
+    assert lines == [pytest.approx((START + timedelta(days=80)).timestamp() * 1000)] * 4
     assert {one["name"] for one in plot.data} == {"log", "mean"}
     assert len(named(plot.data, "mean")) == 4  # no line leads across the change
 

@@ -172,6 +172,11 @@ TORQUES_SWAPPED = '--set tau1.source="tau2" --set tau2.source="tau1"'
             '--set theta1.source="theta2" --set theta2.source="theta1"',
         ),
         (Convention(absolute=1), "θ2 is absolute", "--second-angle absolute"),
+        (
+            Convention(absolute=1, zero=(0.5, 0.25)),
+            "θ2 is absolute and the angles have to be offset by [0.5, 0.75] rad",
+            "--second-angle absolute --set offsets=[0.5, 0.75]",
+        ),
         (Convention(base=1), "the second motor stands at the base", "--set drive=base"),
         (Convention(scale=(DEGREES, 1.0)), "θ1 is in deg", "--set theta1.unit=deg"),
         (Convention(scale=(1.0, 1 / (2 * math.pi))), "θ2 is in rev", "--set theta2.unit=rev"),
