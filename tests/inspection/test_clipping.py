@@ -9,7 +9,7 @@ import pytest
 
 from algid.identification.recordings import Recordings, open_sources
 from algid.inspection.channels import saturation
-from algid.inspection.checks import inspect_log
+from algid.inspection.checks import examine, inspect_log
 from algid.log import Log
 from algid.notices import has_code, of_codes
 from tests.inspection.test_checks import moving_log
@@ -66,6 +66,10 @@ def test_a_sound_log_loses_nothing() -> None:
 
 def test_an_external_torque_is_not_judged() -> None:
     assert saturation(cut_off(), effort="external").limits == ()
+    log = moving_log()
+    held = replace(log, tau=np.where(np.arange(len(log)) // 1000 == 2, 0.25, log.tau))
+    for effort, blamed in ((None, True), ("external", False)):
+        assert has_code(examine(held, lambda: None, effort=effort), "SENSOR_FAULT") == blamed
 
 
 def test_a_limit_that_the_motion_confirms_is_a_note() -> None:
