@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import polars as pl
 
@@ -84,10 +83,13 @@ class History:
     @property
     def untested(self) -> list[Notice]:
         """What was not looked for, and why."""
-        undated, steady = self.roster["undated"].sum(), (~self.roster["tested"]).sum()
-        counts: dict[str, Any] = {"failed": self.failed, "nameless": self.nameless}
-        counts, notices = counts | {"undated": undated, "steady": steady}, []
-        for case, count in counts.items():
+        notices, roster = list[Notice](), self.roster
+        for case, count in (
+            ("failed", self.failed),
+            ("nameless", self.nameless),
+            ("undated", roster["undated"].sum()),
+            ("steady", (~roster["tested"]).sum()),
+        ):
             if count:
                 numbers = {"case": case, "count": count, "least": FEWEST, "months": SPAN}
                 notices.append(Notice("NOT_TESTED", numbers=numbers))

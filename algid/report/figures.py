@@ -46,13 +46,12 @@ def arm_of(result: Result, raw: Drawn | None) -> ArmDrawing | None:
     """
     value = {name: one.estimate or 0.0 for name, one in result.parameters.items()}
     held = result.settings | {name: one.estimate for name, one in result.payload.items()}
-    l1, l2, gravity = held.get("l1"), held.get("l2"), held.get("gravity")
-    if l1 is None and gravity is not None:
-        l1 = length_by_coupling(value, gravity)  # l1 = g |K1| / |K2| (Table 1)
-    if l1 is None or l1 <= 0 or raw is None:
+    # l1 = g |K1| / |K2| (Table 1)
+    l1 = held.get("l1") or length_by_coupling(value, held.get("gravity") or 0.0)
+    if not l1 or l1 < 0 or raw is None:
         return None
-    moved = rows_of(raw.samples, raw.samples["log"] == 0)
-    moved = rows_of(moved, np.isfinite(moved["theta1"] + moved["theta2"]))
+    of, l2 = raw.samples, held.get("l2")
+    moved = rows_of(of, (of["log"] == 0) & np.isfinite(of["theta1"] + of["theta2"]))
     if moved["t"].size < 2:
         return None
     theta = stacked(moved, ("theta1", "theta2"))
@@ -60,7 +59,7 @@ def arm_of(result: Result, raw: Drawn | None) -> ArmDrawing | None:
     if first and second and set(value) & set(SINES):
         theta[0] += cmath.phase(second / first)  # θ1's zero against gravity
     reading = f"Play it: does this arm move as yours did? l1 is {significant(l1, 3)} m."
-    if l2 is None or l2 <= 0:
+    if not l2 or l2 < 0:
         l2, way = l1, flag("l2")
         reading += f" Link 2's length is not known: it is drawn as long as link 1 (give {way})."
     mass = held.get("m_p")

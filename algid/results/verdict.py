@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isclose
 from pathlib import Path
@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from algid.base.criteria import SAME_LENGTH
 from algid.base.errors import ResultError, SettingError
 from algid.base.files import read_toml
-from algid.base.names import outside
+from algid.base.names import outside, within
 from algid.base.significance import SURE
 from algid.base.text import counted, percent, significant, visible
 from algid.model import CHOICES, EVERY_TERM, K1, K2, K3, K4, K5, K6, K7
@@ -324,37 +324,33 @@ def judged_errors(result: Result, largest: float | str | Path) -> list[Judged]:
     ResultError
         If the result holds no truth to compare with, or no case of the paper.
     """
-    log = result.log.path
+    log, word = result.log.path, str(largest)
     rows = {row.parameter: row for row in result.table4 if row.truth is not None}
     if not rows:
         raise ResultError(
             f"{log}: the log holds no true parameters; only synthetic logs can be checked"
         )
-    limits: Mapping[str, float | None] = {
-        name: row.paper_error_percent for name, row in rows.items()
-    }
-    if largest == "paper" and not any(limit is not None for limit in limits.values()):
-        raise ResultError(f"{log}: not a case of the paper; give {flag('max_error')} in percent")
-    if str(largest).endswith(".toml"):
-        limits = read_toml(Path(str(largest)), _Tolerances).max_error_percent
-        for name in limits:
-            if name not in rows:
-                raise SettingError(
-                    f"{largest}: max_error_percent.{name}: expected one of {', '.join(rows)}"
-                )
-    elif largest != "paper":
+    if word == "paper":
+        of_paper = {name: row.paper_error_percent for name, row in rows.items()}
+        limits = {name: limit for name, limit in of_paper.items() if limit is not None}
+        if not limits:
+            raise ResultError(
+                f"{log}: not a case of the paper; give {flag('max_error')} in percent"
+            )
+    elif word.endswith(".toml"):
+        limits = read_toml(Path(word), _Tolerances).max_error_percent
+        for name in outside(limits, rows):
+            raise SettingError(
+                f"{word}: max_error_percent.{name}: expected one of {', '.join(rows)}"
+            )
+    else:
         try:
-            percent = float(str(largest))
+            limits = dict.fromkeys(rows, float(word))
         except ValueError:
-            percent = -1.0
-        if not 0 <= percent <= LARGEST:
+            limits = {"": -1.0}
+        if not 0 <= max(limits.values()) <= LARGEST:
             raise SettingError(
                 f"{flag('max_error')}: expected a number from 0 to {LARGEST:g}, paper, or a TOML "
                 f"file, found {largest!r:.60}"
             )
-        limits = dict.fromkeys(rows, percent)
-    return [
-        Judged(name, row.error_percent, limit)
-        for name, row in rows.items()
-        if (limit := limits.get(name)) is not None
-    ]
+    return [Judged(name, rows[name].error_percent, limits[name]) for name in within(rows, limits)]
