@@ -83,6 +83,7 @@ class Batched:
         return {end.value: counts[end] for end in JobStatus if end in counts}
 
 
+@dataclass(eq=False)
 class Batch:
     """A batch on one OUT, whose lock its caller holds.
 
@@ -96,25 +97,23 @@ class Batch:
     shared : whether other batches do other jobs of the same OUT
     """
 
-    def __init__(
-        self,
-        store: Store,
-        task_of: Callable[[Job], Task],
-        submit: Callable[..., Future[Any]],
-        slots: int,
-        progress: Callable[[JobRecord, int, int], object],
-        shared: bool = False,
-    ) -> None:
-        self._store, self._task_of, self._submit = store, task_of, submit
-        self._slots, self._progress, self._shared = slots, progress, shared
-        self._stopped: str | None = None
-        self._ran = 0
-        self._written = False
-        self.stop = threading.Event()
-        """If set, `run` returns at once; running jobs are left to whoever ends the executor."""
-        self.anew = Counter[str]()
-        """Jobs that had ended and were run again, by why."""
-        self.records, self.unreadable = read_records(store)
+    store: Store
+    task_of: Callable[[Job], Task]
+    submit: Callable[..., Future[Any]]
+    slots: int
+    progress: Callable[[JobRecord, int, int], object]
+    shared: bool = False
+    ran: int = 0
+    written: bool = False
+    """Whether the table has all records."""
+    stopped: str | None = None
+    stop: threading.Event = field(default_factory=threading.Event)
+    """If set, `run` returns at once; running jobs are left to whoever ends the executor."""
+    anew: Counter[str] = field(default_factory=Counter)
+    """Jobs that had ended and were run again, by why."""
+
+    def __post_init__(self) -> None:
+        self.records, self.unreadable = read_records(self.store)
         """Why records that are there cannot be read, by their places."""
 
     def run(self, jobs: Sequence[Job], retry_failed: bool = False) -> Batched:
@@ -126,7 +125,7 @@ class Batch:
         keeps what is known of it.
         """
         waiting, unreachable = deque[Task](), dict[str, JobRecord]()
-        for task in map(self._task_of, jobs):
+        for task in map(self.task_of, jobs):
             job, before = task.job, self.records.get(task.job.name)
             if job.trouble is not None:
                 ended = task.record(JobStatus.FAILED, job.trouble)
@@ -148,18 +147,18 @@ class Batch:
                 self._keep(ended)
         left = self._work(waiting)
         try:
-            if not (self._written and self._store.exists(TABLE)):
-                if self._shared:  # the others have come further meanwhile
-                    self.records |= read_records(self._store)[0]
+            if not (self.written and self.store.exists(TABLE)):
+                if self.shared:  # the others have come further meanwhile
+                    self.records |= read_records(self.store)[0]
                 content = io.BytesIO()
                 jobs_frame([one for _, one in sorted(self.records.items())]).write_parquet(content)
-                self._store.write(TABLE, content.getvalue())
-                self._written = True
+                self.store.write(TABLE, content.getvalue())
+                self.written = True
         except OutputError as error:
             self._stop_because(str(error))
         now = {**self.records, **unreachable}
         records = [now[job.name] for job in jobs if job.name in now]
-        return Batched(records, self._ran, left, self._stopped, self.unreadable, self.anew)
+        return Batched(records, self.ran, left, self.stopped, self.unreadable, self.anew)
 
     def watch(
         self,
@@ -184,7 +183,7 @@ class Batch:
             for job in jobs:
                 now[job.name] = ()  # whoever reads it says why it cannot be looked at
                 with suppress(AlgidError):
-                    now[job.name] = list(map(stat_of, self._task_of(job).files))
+                    now[job.name] = list(map(stat_of, self.task_of(job).files))
                 held = job.trouble or all(one.size for one in now[job.name])
                 if held and now[job.name] == before.get(job.name):
                     settled.append(job)
@@ -207,7 +206,7 @@ class Batch:
         if record.basis != task.basis:
             other = record.version != __version__
             return f"of algid {record.version}" if other else "of other settings"
-        if record.has_result and not self._store.exists(f"{task.job.name}.algid/result.json"):
+        if record.has_result and not self.store.exists(f"{task.job.name}.algid/result.json"):
             return "without their result"
         inputs = tuple(map(stat_of, task.files))
         same = (record.job.logs, record.inputs) == (redacted(task.job).logs, inputs)
@@ -218,10 +217,10 @@ class Batch:
         total = len(waiting)
         running: dict[Future[Any], Task] = {}
         while (running or waiting) and not self.stop.is_set():
-            while waiting and len(running) < self._slots:
+            while waiting and len(running) < self.slots:
                 task = waiting.popleft()
                 try:
-                    future = self._submit(run_task, task)
+                    future = self.submit(run_task, task)
                 except Exception as error:  # a client that is closed
                     future = Future()
                     future.set_exception(error)
@@ -232,8 +231,8 @@ class Batch:
                 if record is None or not self._keep(record):
                     waiting.append(task)
                 else:
-                    self._ran += 1
-                    self._progress(record, total - len(waiting) - len(running), total)
+                    self.ran += 1
+                    self.progress(record, total - len(waiting) - len(running), total)
         for future in running:
             future.cancel()
         return len(waiting) + len(running)
@@ -262,23 +261,23 @@ class Batch:
         before = self.records.get(name, record)
         try:
             if before.has_result and not record.has_result:
-                self._store.remove(f"{name}.algid")
+                self.store.remove(f"{name}.algid")
         except OutputError as error:
             stays = f"; the result of an earlier run stays: {error}"
             record = replace(record, reason=record.reason + stays)
         try:
-            write_record(self._store, record)
+            write_record(self.store, record)
         except OutputError as error:
             self._stop_because(str(error))
             return False
         self.records[name] = record
+        self.written = False
         self.unreadable.pop(record_name(name), None)
-        self._written = False
         return True
 
     def _stop_because(self, reason: str) -> None:
         remedy = "make room and run again" if is_full(reason) else "run again"
-        self._stopped = self._stopped or f"{reason}; {remedy}: what is finished is kept"
+        self.stopped = self.stopped or f"{reason}; {remedy}: what is finished is kept"
         self.stop.set()
 
 

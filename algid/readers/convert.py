@@ -12,7 +12,7 @@ from algid.arm import FloatArray
 from algid.base.errors import LogError
 from algid.base.units import CURRENT, TORQUE, VELOCITY
 from algid.log import ZEROS, ChannelReading, Reading
-from algid.notices import Notice, Remedy
+from algid.notices import Remedy
 from algid.options import flag
 from algid.readers.table import CHANNELS, REFERENCES, SampleTable
 
@@ -92,8 +92,8 @@ def convert(
 
 def channel_readings(
     path: str, mapping: Mapping[str, str], profile: Profile, stated: Mapping[str, str]
-) -> tuple[dict[str, ChannelReading], list[Notice]]:
-    """How each channel in `mapping` is to be read, and where file and user differ about a unit.
+) -> dict[str, ChannelReading]:
+    """How each channel in `mapping` is to be read.
 
     `stated` are units that the file states, in algid's writing or, of none that algid knows, as
     they stand. A user's word beats a file's. A reference is recorded as its angle is, where nothing
@@ -106,7 +106,6 @@ def channel_readings(
         angle in counts without counts a turn.
     """
     readings: dict[str, ChannelReading] = {}
-    notices: list[Notice] = []
     for name in CHANNELS:
         if name not in mapping:
             continue
@@ -131,21 +130,16 @@ def channel_readings(
                 unit, source = there, "names"
             if given:
                 unit, source = given, "profile"
-        file = stated.get(name, unit) if like == name else unit
-        numbers = {"column": mapping[name], "name": like, "unit": file}
         if unit not in known:
             right = Remedy({f"{like}.unit": known[0]}, "say its unit if that is wrong")
             raise LogError(
                 f"{path}: the column {mapping[name]!r} for {like} is in {unit!r}; expected one of "
                 f"{', '.join(known)}; {right}"
             )
-        if file != unit and source != "names":
-            taken = {"taken": unit, "why": "as configured"}
-            notices.append(Notice("OTHER_UNIT", numbers={"case": "stated", **numbers, **taken}))
         factor = channel.sign * profile.signs[joint] * _factor(path, like, channel, unit)
         offset = channel.offset + (0.0 if like[:-1] in ("tau", "omega") else profile.offsets[joint])
         readings[name] = ChannelReading(mapping[name], unit, source, factor, offset)
-    return readings, notices
+    return readings
 
 
 def _factor(path: str, name: str, channel: Angle | Velocity | Torque, unit: str) -> float:

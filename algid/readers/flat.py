@@ -22,7 +22,7 @@ from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.quantiles import median
 from algid.base.units import ANGLE, NANOSECONDS, unit_of
-from algid.log import IntArray, Origin, Reading, add, word_sum
+from algid.log import SLOWEST, IntArray, Origin, Reading, add, word_sum
 from algid.notices import Notice, Remedy
 from algid.readers.annotations import lines_of, settings_unused, stated_rate, unused
 from algid.readers.column_names import (
@@ -166,8 +166,8 @@ def open_offered(offered: Offered, profile: Profile) -> TableReader:
     if profile.joints or (joints and not named):
         reading, order = reading_of(joints or (), profile)
         notices += order
-    notices += _doubts(offered, sources, profile)
     units = units_in_names(sources, offered.units)
+    notices += _doubts(offered, sources, units, profile)
     unit = profile.time_unit or unit_of(units.pop("t", ""))
     clock = Clock(unit, unit is not None)
     mapping = {"t": f"rows at {profile.rate or 0:g} Hz"}
@@ -193,7 +193,7 @@ def open_offered(offered: Offered, profile: Profile) -> TableReader:
     angle = ANGLE.get(profile.channel("theta1").unit or units.get("theta1", "rad"))
     notices += moving_joints(others, look, angle) if angle else ()
     topics = dict.fromkeys(fields[source].topic for name, source in sources.items() if name != "t")
-    channels, of_units = channel_readings(path, mapping, profile, units)
+    channels = channel_readings(path, mapping, profile, units)
     reading = replace(
         reading,
         clock=offered.clock,
@@ -204,7 +204,6 @@ def open_offered(offered: Offered, profile: Profile) -> TableReader:
         accepted=profile.accept,
         **{name: getattr(profile, name) for name in _AS_IN_A_PROFILE},
     )
-    notices += of_units
     said = [line[: LIMITS.stated_letters] for line in offered.said[: LIMITS.stated_lines]]
     notices += unused(said, reading, profile)
     notices += settings_unused(profile, reading, mapping)
@@ -256,9 +255,12 @@ def _naming(channels: Sequence[str]) -> Remedy:
     return Remedy({"time" if name == "t" else f"{name}.source": None for name in channels})
 
 
-def _doubts(offered: Offered, sources: Mapping[str, str], profile: Profile) -> Iterator[Notice]:
-    """What to say of commands, of units that differ in a name and beside it, and of motors.
+def _doubts(
+    offered: Offered, sources: Mapping[str, str], units: Mapping[str, str], profile: Profile
+) -> Iterator[Notice]:
+    """What to say of commands, of units that file and user, or a name and its file, differ about.
 
+    `units` are those that the file states, by channel. A user's word beats a file's.
     Motors' signals are told where nobody tells their gear, currents where they are taken for
     torques.
 
@@ -273,17 +275,13 @@ def _doubts(offered: Offered, sources: Mapping[str, str], profile: Profile) -> I
     of_joints, of_motors = list[str](), list[str]()
     for name, column in sources.items():
         user = profile.time_unit if name == "t" else profile.channel(name).unit
-        said, beside = (
-            unit_of(take_apart(column).unit or ""),
-            unit_of(offered.units.get(column, "")),
-        )
-        numbers = {"case": "stated", "column": column, "name": name, "unit": said or beside}
-        if name == "t" and user and numbers["unit"] not in (None, user):
-            numbers |= {"taken": user, "why": "as configured"}
-            yield Notice("OTHER_UNIT", numbers=numbers)
-        elif said and beside and said != beside and not user:
-            numbers |= {"unit": beside, "taken": said, "why": "as its name says"}
-            yield Notice("OTHER_UNIT", numbers=numbers)
+        stated = units.get(name, "")
+        unit, why = stated, "as configured"
+        if not user:
+            unit, why = unit_of(offered.units.get(column, "")) or stated, "as its name says"
+        if unit and unit != (taken := user or stated):
+            numbers = {"case": "stated", "column": column, "name": name, "unit": unit}
+            yield Notice("OTHER_UNIT", numbers={**numbers, "taken": taken, "why": why})
         if name not in JOINT_CHANNELS:
             continue
         current = name.startswith("tau") and take_apart(column).stem in CURRENTS
@@ -368,7 +366,7 @@ def samples(
         except ValueError as error:
             raise LogError(f"{path}: {error} in column {column!r}, past row {done}") from error
         doubtful = unit and not (done or clock.stated)
-        if doubtful and (step := _median_step(stamps - stamps[:1])) > _SLOWEST_NS:
+        if doubtful and (step := _median_step(stamps - stamps[:1])) > 1e9 * SLOWEST:
             likely = _unit_of_step(step / NANOSECONDS[unit or "s"])
             numbers = {"case": "slow time", "column": column, "unit": unit, "rate": 1e9 / step}
             other = Remedy({"time_unit": likely}, f"if they are in {likely}")
@@ -401,8 +399,6 @@ def samples(
 
 _EPOCH = (("s", 1e8, 1e11), ("ms", 1e11, 1e14), ("us", 1e14, 1e17), ("ns", 1e17, 1e20))
 _STEPS = (("s", 0.2), ("ms", 50.0), ("us", 50_000.0))
-_SLOWEST_NS = 200_000_000
-"""A longer median step is no recording of an arm in motion: it has 5 Hz at least."""
 
 
 def time_unit(times: NDArray[Any]) -> str:
