@@ -6,6 +6,7 @@ import random
 from collections.abc import Iterable
 from heapq import merge
 from itertools import repeat
+from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
@@ -74,7 +75,7 @@ stamps in ns and contents of its messages."""
 
 def joint_states(log: Log) -> Topic:
     """The log's messages in CDR."""
-    contents = (payload.tobytes() for payload in mcap.messages(log))
+    contents = (payload.tobytes() for payload in mcap.messages(Path(), log)[mcap.TOPIC])
     stamped = zip(log.stamp_ns.tolist(), contents, strict=True)
     definition = JOINT_STATE_DEFINITION.encode()
     return "/joint_states", "cdr", JOINT_STATE, "ros2msg", definition, stamped

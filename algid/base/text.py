@@ -113,11 +113,14 @@ MOST_DIGITS = 8
 
 
 class _Cells(string.Formatter):
-    """Python's formats, and ``{:~3}`` for three significant digits; None is a dash, True is yes."""
+    """Python's formats, and ``{:~3}`` for three significant digits; True is yes.
+
+    None and NaN are a dash.
+    """
 
     def format_field(self, value: Any, spec: str) -> str:
         """One value as `spec` has it."""
-        if value is None:
+        if value is None or value != value:
             return ABSENT
         if isinstance(value, bool):
             return "yes" if value else "no"

@@ -14,7 +14,7 @@ from pydantic_core import to_json
 from algid.arm import FloatArray
 from algid.base.files import whole_file
 from algid.base.significance import NORMAL, sigmas
-from algid.base.text import ABSENT, counted, file_name, joined, percent, visible
+from algid.base.text import ABSENT, cells, counted, file_name, joined, percent, visible
 from algid.notices import Grade, Verdict
 from algid.report.document import Document, Section, Table
 from algid.report.plot import down
@@ -24,6 +24,8 @@ from algid.results import Result
 from algid.results.rows import row_of
 
 NAME = "compare.html"
+FIRST = "{0.name} | {1} | {0.with_half} |  | {0.unit} | {0.status} | "
+OTHER = "{0.name} | {1} | {0.with_half} | {2:+.1f} | {0.unit} | {0.status} | {3}"
 ASIDE = re.compile(r"command|used\..*|.*told")
 """Settings that are no difference: a command names the logs and says again what is set."""
 FAR = sigmas()
@@ -92,8 +94,7 @@ class Comparison:
                 if name in result.estimates:
                     row, far = row_of(name, result.estimates[name]), self.sigma[log, place]
                     off = percent(numbers[log, place] - numbers[0, place], numbers[0, place], 3)
-                    change = ("" if np.isnan(far) else f"{far:+.1f}", row.unit, row.status)
-                    estimates.append((row.name, label, row.with_half, *change, off if log else ""))
+                    estimates.append(cells(OTHER if log else FIRST, row, label, far, off))
         for name, values in self.settings.items():
             for label, value in zip(self.labels, values, strict=True):
                 settings.append((visible(name), label, visible(value)))

@@ -10,9 +10,6 @@ topic             fields
 ================  ==============================================================================
 
 Several logs keep a topic each: the second one's is `/algid/log2/torque` and so on.
-
-ROS 2 messages in CDR, little endian, laid out as rows of structured arrays: only the stamp and the
-numbers differ between them.
 """
 
 from __future__ import annotations
@@ -29,7 +26,7 @@ from algid import __version__
 from algid.base.files import whole_file
 from algid.base.names import stacked
 from algid.base.progress import Progress
-from algid.base.ros2 import HEADER, check_stamps
+from algid.base.ros2 import HEADER, headed
 from algid.report.series import facts_of, stretches
 from algid.results import read_result
 
@@ -39,7 +36,6 @@ if TYPE_CHECKING:
 START_KEY = b"start_ns"
 SERIES = "algid_msgs/msg/Series"
 ROWS = 1 << 14
-BILLION = 1_000_000_000
 
 
 def export_mcap(folder: Path, progress: Progress | None = None) -> Path:
@@ -93,15 +89,7 @@ def _write_series(writer: Writer, path: Path, name: str, progress: Progress | No
         # whole nanoseconds, which float64 seconds resolve for a hundred days
         stamps = np.rint(block["t"] * 1e9).astype(np.int64)
         stamps += starts[log] if log < len(starts) else 0
-        check_stamps(path, stamps)
-        # the empty frame's length, its end, and what aligns the numbers
-        layout = np.dtype([
-            ("encapsulation", "u1", 4), ("sec", "<i4"), ("nanosec", "<u4"), ("length", "<u4"),
-            ("frame", "V4"), ("numbers", "<f8", len(names)),
-        ])  # fmt: skip
-        rows = np.zeros(stamps.size, layout)
-        rows["encapsulation"], rows["length"] = (0, 1, 0, 0), 1
-        rows["sec"], rows["nanosec"] = np.divmod(stamps, BILLION)
+        rows = headed(path, stamps, [("numbers", "<f8", len(names))])
         rows["numbers"] = stacked(block, names, axis=1)
         for stamp, row in zip(stamps.tolist(), rows, strict=True):
             writer.add_message(channels[log], stamp, row.tobytes(), stamp)

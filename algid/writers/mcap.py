@@ -1,14 +1,11 @@
 """MCAP logs as of a ROS 2 recorder: sensor_msgs/msg/JointState, /joint_states, CDR, zstd.
 
 The angles that a controller was to follow are the positions of /joint_references.
-
-The messages of a block are laid out at once as rows of one structured array, since only the stamp
-and the numbers differ between them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.base.files import whole_file
-from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION, check_stamps
+from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION, headed
 from algid.log import KEY, Companion, Log, Truth
 
 TOPIC = "/joint_states"
@@ -55,10 +52,7 @@ def write(
         writer.start("ros2", "algid")
         schema = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
         for block in blocks:
-            check_stamps(path, block.stamp_ns)
-            written = {TOPIC: messages(block)}
-            if block.reference is not None:
-                written[REFERENCES] = _filled(block, position=block.reference)
+            written = messages(path, block)
             for topic in written:
                 if topic not in channels:
                     qos = {"offered_qos_profiles": _QOS}
@@ -73,36 +67,32 @@ def write(
         writer.finish()  # type: ignore[no-untyped-call]
 
 
-def messages(block: Log) -> NDArray[np.void]:
-    """The samples of a block as JointState messages in CDR (N,); `check_stamps` must hold."""
-    return _filled(block, position=block.theta, velocity=block.omega, effort=block.tau)
+def messages(path: Path, block: Log) -> dict[str, NDArray[np.void]]:
+    """The messages (N,) of a block by topic, for the file `path`. Raises `OutputError`."""
+    signals = {"position": block.theta, "velocity": block.omega, "effort": block.tau}
+    written = {TOPIC: _states(path, block, signals)}
+    if block.reference is not None:
+        written[REFERENCES] = _states(path, block, {"position": block.reference})
+    return written
 
 
-def _filled(block: Log, **signals: NDArray[np.floating[Any]] | None) -> NDArray[np.void]:
-    """Messages with the signals that there are.
+def _states(
+    path: Path, block: Log, signals: Mapping[str, NDArray[np.floating[Any]] | None]
+) -> NDArray[np.void]:
+    """JointState messages (N,) with the signals that there are.
 
-    CDR counts a number's alignment from behind the four bytes of the encapsulation.
+    CDR counts a number's alignment from behind the four bytes of the encapsulation, which are a
+    fifth of the header's.
     """
-    fields: list[Any] = [
-        ("encapsulation", "u1", 4),
-        ("sec", "<i4"),
-        ("nanosec", "<u4"),
-        ("frame_length", "<u4"),
-        ("frame", "V4"),
-        ("names", "<u4"),
-    ]
+    fields: list[Any] = [("names", "<u4")]
     for joint in JOINTS:
         fields += [(f"{joint}_length", "<u4"), (joint, "S8")]
     for name in ("position", "velocity", "effort"):
         fields.append((f"{name}_count", "<u4"))
         if signals.get(name) is not None:
-            fields += [(f"{name}_padding", "V4")] * (np.dtype(fields).itemsize % 8 == 0)
+            fields += [(f"{name}_padding", "V4")] * (np.dtype(fields).itemsize % 8 == 4)
             fields.append((name, "<f8", 2))
-    rows = np.zeros(len(block), fields)
-    rows["encapsulation"] = (0, 1, 0, 0)
-    rows["sec"] = block.stamp_ns // 10**9
-    rows["nanosec"] = block.stamp_ns % 10**9
-    rows["frame_length"] = 1
+    rows = headed(path, block.stamp_ns, fields)
     rows["names"] = len(JOINTS)
     for joint in JOINTS:
         rows[f"{joint}_length"] = len(joint) + 1
