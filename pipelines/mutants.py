@@ -141,21 +141,21 @@ def tests_of(room: str) -> list[str]:
 def chosen(mutant: Mutant, seconds: dict[str, float], lines: dict[str, list[str]]) -> list[str]:
     """Of the room's tests those that reach the mutant's lines first, then those that reach its
     file, then those beside them: what is reached on import, by a fixture or by another process is
-    told of one test or of none. The cases of a test take turns with other tests.
+    told of one test or of none. Quick ones come first, of many cases of a test some.
     """
     reach = {test for line in mutant.lines for test in lines.get(str(line), ())}
     file = {test for tests in lines.values() for test in tests}
     beside = {test.partition("::")[0] for test in file}
-    order, cases = list[tuple[bool, bool, bool, int, float, str]](), Counter[str]()
+    order, cases = list[tuple[bool, bool, bool, float, str]](), Counter[str]()
     for test in sorted(seconds, key=seconds.__getitem__):
         own, name = test.partition("::")[0], test.partition("[")[0]
-        far = (test not in reach, test not in file, own not in beside, cases[name])
-        order.append((*far, seconds[test], test))
         cases[name] += 1
+        far = (test not in reach, test not in file, own not in beside)
+        order.append((*far, seconds[test] * cases[name], test))
     kept: list[str] = []
     spent = 0.0
-    for *_, took, test in sorted(order):
-        spent += took
+    for *_, test in sorted(order):
+        spent += seconds[test]
         if kept and spent > BUDGET:
             break
         kept.append(test)

@@ -135,6 +135,10 @@ def test_a_batch_beside_an_arms_result_takes_its_logs_for_loaded_ones(
     assert done.code == 0, done.out
     found = algid.read_result(tmp_path / "out" / "monday.algid").payload["m_p"]
     assert found.estimate == pytest.approx(0.3515, rel=0.05)
+    one = ("--loaded", tmp_path / "monday.mcap", "--parameters", result, "-o", tmp_path / "one")
+    assert call("identify", *one, "--estimator", "weak", "--no-report").code == 0
+    alone = algid.read_result(tmp_path / "one" / "monday.algid").payload["m_p"]
+    assert alone.estimate == found.estimate
     monkeypatch.chdir(tmp_path)
     assert call("export", "out/monday.algid", "--to", "payload").code == 0
     assert Path("monday-payload.yaml").is_file()

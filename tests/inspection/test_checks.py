@@ -83,7 +83,8 @@ def test_encoder_step_and_noise_floor() -> None:
     stepped = np.rint(smooth / 3.8e-4) * 3.8e-4
     assert signal_figures(stepped).step == pytest.approx(3.8e-4, rel=1e-6)
     assert signal_figures(smooth).step == 0
-    assert signal_figures(np.array([0.0, 1.0, 1.0])).step == 0  # two levels are no grid
+    for values, step in (([0, 1, 1], 0), ([0, 1, 3], 1)):  # two levels are no grid
+        assert signal_figures(np.array(values, dtype=float)).step == step
 
 
 @pytest.mark.slow

@@ -90,7 +90,9 @@ def test_tables_have_what_the_fit_knows(folder: Path, result: Result) -> None:
         ["each log by the others", "1", "0.123", "5.00", "0.99750", "–", "–", "–"],
         ["each log by the others", "2", "2.00", "50.0", "0.75000", "–", "–", "–"],
     ]
-    assert rows["Terms tried"] == [["rotor", "-12.3", "+3.3", "yes"]]
+    assert shown.tables["Terms tried"] == (
+        ["Term", "Change of BIC", "Beyond chance", "Kept"], [["rotor", "-12.3", "+3.3", "yes"]],
+    )  # fmt: skip
     assert [row[0] for row in rows["Terms whose interval holds zero"]] == ["f1"]
     assert rows["Noise of the logs"] == [["tau1", "0.0123", "N m"], ["theta2", "1.00e-4", "rad"]]
     assert rows["Whiteness of the residual"] == [["tau1", "no", "0.012", "0.500"]]
