@@ -86,9 +86,9 @@ def test_results_are_named_by_their_folders(tmp_path: Path) -> None:
 
 
 def test_a_batch_says_what_it_ran_anew_and_what_it_passed_over() -> None:
-    anew, torn = {"other settings": 2}, {"b.json": "torn"}
+    anew, torn = {"other settings": 2, "a new log": 1}, {"b.json": "torn"}
     told = answer(Batched([GOOD], 1, 0, None, torn, anew, "out", links=["mon"]), {})
-    assert next(iter(told.shown)) == "run anew: 2 other settings"
+    assert next(iter(told.shown)) == "run anew: 2 other settings, 1 a new log"
     record, links = told.complaints
     assert record == "out/b.json: no record of a job (torn); it counts as none: remove it"
     assert links == ("links to folders are not entered (mon); name what they lead to as sources")
