@@ -301,6 +301,7 @@ def test_tables_of_the_guide_and_the_readme_are_those_of_the_code() -> None:
     for old, new in MOVED.items():
         assert f"| `{old}` | {new} |" in text_of("start")
     assert call("guide", "estimators").out == text_of("estimators")
+    assert "one of start, arm, lab" in call("guide", "nothing").err
     assert call("guide", "uneven_stamps").out.startswith("# UNEVEN_STAMPS\n")
     assert all(f"algid guide {topic}" in call("guide").out for topic in TOPICS)
 

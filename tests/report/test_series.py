@@ -61,7 +61,9 @@ def test_every_bucket_keeps_its_smallest_and_its_largest(
 def test_a_gap_breaks_the_line(tmp_path: Path) -> None:
     frame = write(tmp_path / "a.parquet", (500,))
     frame.filter(~pl.col("t").is_between(1.0, 1.5)).write_parquet(tmp_path / "a.parquet")
-    short = drawn(tmp_path / "a.parquet", points=2000)
+    heard = list[tuple[str, int, int]]()
+    short = drawn(tmp_path / "a.parquet", 2000, lambda *step: heard.append(step))
+    assert heard == [("report", 449, 449)]
     assert short is not None
     (place,) = np.flatnonzero(np.isnan(short["tau1"]))
     assert short["x"][place] == short["x"][place - 1] == pytest.approx(0.99)

@@ -139,7 +139,8 @@ CASES = {
     ),
     "narrower": Case(lambda r: of(r, estimate(-2, 0.1, "N m"), "k2"), "good", [], "k2, to ±9.8 %"),
     "all from a prior": Case(
-        lambda r: alone(r, PRIOR), "failed", ["FROM_PRIOR"], "no parameter"
+        lambda r: of(alone(r, PRIOR), VAGUE, "k2"),
+        "failed", ["FROM_PRIOR", "NOT_SIGNIFICANT"], "no parameter",
     ),
     "vague shrunk term of the user": Case(lambda r: chosen(r, "settings", shrunk=["f1"]), "good"),
     "vague phase of the logs": Case(
@@ -225,9 +226,10 @@ CASES = {
     "clipped": Case(
         lambda r: noticed(
             r, APART, Notice("SATURATED_EFFORT", "a", numbers={"percent": 1.9}),
+            Notice("SATURATED_EFFORT", "of an earlier version"),
             Notice("SATURATED_EFFORT", "b", numbers={"percent": 2.1}),
         ),
-        codes=["SATURATED_EFFORT", "LOGS_APART", "SATURATED_EFFORT"],
+        codes=["SATURATED_EFFORT", "LOGS_APART", *["SATURATED_EFFORT"] * 2],
     ),
     "a note": Case(lambda r: noticed(r, Notice("CUT", "cut", note=True)), "good"),
 }  # fmt: skip
