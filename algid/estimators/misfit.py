@@ -8,9 +8,9 @@ test (1948) sees it: of torques G that a motion makes, beside those of the model
 
 and W is χ² of rank(M) degrees of freedom where the model holds. G has the columns of the terms
 that the model is without, one of a delay, and shapes that no term has: friction of gears by all
-torque that passes them, a motor that saturates or has a dead band, drag of the air, cogging and
-cables' pull by the joint's angle, friction that changes along a turn, and what one drive does to
-the other joint.
+torque that passes them, a motor that saturates or has a dead band, drag of the air, springs (a
+cable, a hose), cogging and other pull by the joint's angle, friction that changes along a turn, and
+what one drive does to the other joint.
 
 A controller makes torque of its encoders' noise, which the residual holds too: that they correlate
 looks like a delay of the torque. Such a torque is fast: the columns are those of the smooth motion.
@@ -57,6 +57,7 @@ _SHAPES: tuple[tuple[str, Callable[[_Joint], FloatArray]], ...] = (
     ("saturation", lambda j: np.abs(j.T) * j.T),
     ("dead band", lambda j: np.sign(j.T)),
     ("drag", lambda j: np.abs(j.omega) * j.omega),
+    ("spring", lambda j: j.theta - j.theta.mean()),
     ("once a turn", lambda j: np.sin(j.theta)),
     ("once a turn", lambda j: np.cos(j.theta)),
     ("twice a turn", lambda j: np.sin(2 * j.theta)),

@@ -23,6 +23,8 @@ against show how far they may move an estimate: with a coefficient h of each, no
 
     S - BᵀQ,  g - QᵀGᵀe,   Q = (GᵀG + σ⁻²)⁻¹ B,   B = GᵀX
 
+An interval takes in how far that moves the estimate, and is no narrower than what it leaves open.
+
 **Endogenous torque.** Torque that the model lacks drives the motion, and least squares is
 attenuated by it. Instruments (`algid.estimators.instruments`) are not, as long as they do not
 answer that torque: the logged reference of a controller never does, the measured torque does not
@@ -80,7 +82,7 @@ from algid.estimators.combine import (
 )
 from algid.estimators.diagnostics import broken_bounds
 from algid.estimators.excitation import undriven
-from algid.estimators.fit import Fit, finish, solved_anew
+from algid.estimators.fit import Fit, finish, solved_anew, widened
 from algid.estimators.instruments import Explained, followed
 from algid.estimators.misfit import of_no_term
 from algid.estimators.modulating_functions import Known, Windows, row_weights
@@ -326,6 +328,8 @@ class RobustProblem:
 
             W = V + Σ d dᵀ / n,   d = β_other − β, by least squares
 
+        V is no narrower than what torques beside the model's leave open.
+
         Gears rub in proportion to the torque that passes them: a joint's load L, or all other
         torque, friction D of motor and bearings included, by their order along the drive. Between
         both is e (|L + D| − |L|) tanh(ω / ω_s) ≈ e |D| sgn L, which looks like a gain common to
@@ -333,17 +337,21 @@ class RobustProblem:
         to window shows it.
         """
         determined = np.array([status != "NOT_IDENTIFIABLE" for status in least.status])
-        moved = []
+        moved, covariance = [], fit.covariance
         for settings in others:
             try:
                 other = self.least_squares(**settings)
             except TooShortError:  # of the longer windows
                 continue
             moved.append(np.where(determined, other.values - least.values, 0.0))
+            if settings.get("beside"):
+                # near the hanging arm a spring is weight: least squares does not move then, but
+                # leaves open as much of the constant as the spring may be
+                covariance = widened(covariance, other.covariance)
         if not moved:
             return fit
         scatter = np.transpose(moved) @ np.array(moved) / len(moved)
-        return replace(fit, covariance=fit.covariance + scatter)
+        return replace(fit, covariance=covariance + scatter)
 
     def instruments_if_endogenous(self, least: Fit) -> Fit:
         """The fit by least squares, or by instruments where those differ and answer nothing.

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from algid.arm import FloatArray
+from algid.arm import FloatArray, inverse_dynamics
 from algid.base.names import vector
 from algid.estimators.elastic import flexed
 from algid.estimators.log_likelihood import Beside
@@ -19,9 +19,10 @@ from algid.estimators.whitening import modelled
 from algid.identification.identify import identify
 from algid.model import RIGID, TERMS, Model, Motion, torque
 from algid.settings import Settings
+from algid.synth.simulator import HANGING
 from pipelines import conventions, planar
 from pipelines import misfit as scenes
-from pipelines.accuracy_scenes import case_of
+from pipelines.accuracy_scenes import case_of, logged, waves
 from tests.intervals import distances
 
 DT = 1e-3
@@ -96,6 +97,24 @@ def test_white_noise_is_no_misfit_and_a_shape_of_no_term_is() -> None:
     motion, model = motion_of(), Model(("coulomb",))
     assert told(model, C, motion, np.zeros((2, 400)))[1] > 0.01
     assert told(model, C, motion, 0.6 * np.sin(2 * motion.theta))[1] < 1e-4
+    far = replace(motion, theta=4 * motion.theta)
+    assert told(model, C, far, 0.1 * far.theta)[1] < 1e-4
+
+
+def test_a_spring_near_the_hanging_arm_is_no_weight_beyond_its_interval() -> None:
+    """Least squares beside a spring's column did not move, and k4 was 5 and 7 σ off."""
+    for case, share in (("case1", 0.01), ("case2", 0.03)):
+        rng, k = np.random.default_rng(3), case_of(case).arm.constants()
+        f, phase, t = rng.uniform(0.3, 2, (2, 4)), rng.uniform(0, 6, (2, 4)), np.arange(2500) / 250
+        theta, omega, alpha = waves(t, f, 0.25 / np.sqrt(f), phase)
+        theta += HANGING[:, None]
+        tau = inverse_dynamics(k, theta, omega, alpha)
+        size = np.sqrt(np.mean(tau**2, axis=1, keepdims=True))
+        bent = theta - theta.mean(axis=1, keepdims=True)
+        pulled = tau + share * size * bent / bent.std(axis=1, keepdims=True)
+        result = identify(logged(t, theta, pulled, rng, (3e-4, 0.01 * size)), report=False)
+        assert "REFUTED" in {notice.code for notice in result.notices}
+        assert np.abs(distances(result, k[:5], RIGID)).max() < 4
 
 
 @pytest.mark.slow
