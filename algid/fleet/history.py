@@ -19,10 +19,14 @@ from algid.notices import Notice
 MONTH_DAYS = 30.4375
 PARAMETERS = Model(FIRST_TERMS).names
 """Those that most robots have: others would be tested on few logs."""
+NUMBERS = [
+    "label_payload",
+    *(f"{name}{end}" for name in (*PARAMETERS, "m_p") for end in ("", "_std")),
+]
 
 
 def read_jobs(path: Path) -> pl.DataFrame:
-    """The jobs of ``jobs.parquet``; a number that is none, or beyond all bounds, is null.
+    """The jobs of ``jobs.parquet``; a number that is none, or not there, or beyond bounds, is null.
 
     ``t`` is in months, ``month`` whole, both null without a time.
 
@@ -38,12 +42,9 @@ def read_jobs(path: Path) -> pl.DataFrame:
         missing = [name for name in ("job", "robot", "status", "time") if name not in columns]
         if missing:
             raise ResultError(f"{path}: no column {', '.join(missing)}; {expected}")
-        wanted = ["label_payload", "m_p", "m_p_std"]
-        none = {name: pl.lit(None) for name in wanted if name not in columns}
-        for name in PARAMETERS:
-            wanted += [name, f"{name}_std"] if {name, f"{name}_std"} <= {*columns} else []
+        none = {name: pl.lit(None) for name in NUMBERS if name not in columns}
         # a manifest's labels may be words: then they are no numbers
-        number, most = pl.col(wanted).cast(pl.Float64, strict=False), LIMITS.largest_value
+        number, most = pl.col(NUMBERS).cast(pl.Float64, strict=False), LIMITS.largest_value
         age = pl.col("time") - pl.col("time").min().over("robot")
         t = age.dt.total_seconds() / (86400 * MONTH_DAYS)
         jobs = jobs.with_columns(**none).select(
@@ -116,9 +117,9 @@ def history_of(path: Path, progress: Progress | None = None) -> History:
     """
     every = read_jobs(path)
     finished = every.filter(pl.col("status").is_in(["ok", "incomplete"]))
-    names = [name for name in PARAMETERS if name in finished.columns]
+    names = [name for name in PARAMETERS if (finished[name] * finished[f"{name}_std"]).count()]
     jobs = finished.filter(pl.col("robot").is_not_null())
-    if not finished.height or not names:
+    if not names:
         raise ResultError(
             f"{path}: no job has given parameters; see its column reason, and run algid batch again"
         )
