@@ -19,7 +19,7 @@ from typing import Any
 
 from algid import __version__
 from algid.base.errors import AlgidError, OutputError, text_of
-from algid.base.files import refuse_links
+from algid.base.files import refuse_links, writing
 from algid.base.staging import TEMPORARY, delete_leftovers
 from algid.base.stores import Store, is_url
 from algid.batches.job import Task, is_full, redacted, run_task
@@ -300,14 +300,9 @@ def locked(out: str, shared: bool = False) -> Iterator[None]:
         return
     path = Path(out, FOLDER, "lock")
     refuse_links(Path(out), f"{FOLDER}/lock")
-    try:
+    with writing(out, "cannot write there"):
         path.parent.mkdir(parents=True, exist_ok=True)
         handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
-    except OSError as error:
-        raise OutputError(
-            f"{out}: cannot write there ({error.strerror}); choose another folder with "
-            f"{flag('out')}"
-        ) from error
     kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
     until = time.monotonic() + DYING
     try:

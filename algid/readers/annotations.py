@@ -38,10 +38,16 @@ _MOST = 8
 """Values that are listed."""
 _SAME_RATE = 0.1
 """Relative: a recorder's jitter, and what it rounds."""
-_BEFORE_UNIT = ("in", "unit", "units", "is", "are", "#", "//")
-"""Words behind which a unit stands; elsewhere it is one in brackets alone."""
-_NO_UNITS = ("a", "in", "m", "milli", "micro", "nano")
-"""Words of a sentence, even there."""
+_COMMON = frozenset(
+    words(
+        """
+        a amp amps s in m turn turns count counts inc increments tick ticks sec secs second seconds
+        rev revs milli millis micro micros nano nanos rad radians
+        """
+    )
+)
+"""Units that are also words: units only in brackets, or behind these words."""
+_BEFORE_UNIT = ("in", "unit", "units", "is", "are")
 _TIME_WORDS = frozenset((*TIMES, "times", "timestamps", "stamps"))
 GROUPS = frozenset(
     words(
@@ -173,15 +179,18 @@ def other_rate(stated: float | None, stamp_ns: IntArray) -> tuple[Notice, ...]:
 def _other_units(text: str, reading: Reading) -> Iterator[tuple[str, object]]:
     """Settings for the units that a line names, and in which no signal is read.
 
-    A unit stands in brackets, or behind a word such as ``in``.
+    A unit behind a number is that of a quantity, ``30 deg``. One that is a word of English too
+    counts in brackets, or behind a word such as ``in``.
     """
     letters = text.replace(",", " ").split()
     for before, word, behind in zip(["", *letters], letters, [*letters[1:], ""], strict=False):
         bare = word.strip("[](){};.\"'*")
         sure = before.lower() in _BEFORE_UNIT or before[-1:] in tuple(":=") or word[:1] in "[("
-        if not sure or bare in _NO_UNITS:
+        if re.match(r"[-+~±]?\d", before) or bare in ("", "a"):
             continue
-        unit = unit_of(f"{bare} {behind.strip('])}.')}") or unit_of(bare)
+        unit = unit_of(f"{bare} {behind.strip('])}.')}") if behind else None
+        if unit is None and (sure or bare.lower() not in _COMMON):
+            unit = unit_of(bare)
         quantity = "omega" if "/" in bare or unit == "rpm" else "theta"
         if unit in TORQUE or unit in CURRENT:
             quantity = "tau"
@@ -191,7 +200,7 @@ def _other_units(text: str, reading: Reading) -> Iterator[tuple[str, object]]:
                 yield "time_unit", unit
             continue
         elif unit is None:
-            if not is_foreign(bare):
+            if not (sure and is_foreign(bare) and bare not in _COMMON):
                 continue
             quantity = next((one for one in ("theta", "tau") if _names(one, text)), "")
         for name, channel in reading.channels.items():

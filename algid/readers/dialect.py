@@ -245,6 +245,12 @@ def _lines(path: Path, head: bytes) -> list[str]:
         raise LogError(f"{path}: the text is UTF-16; save it as UTF-8")
     text = head.decode("utf-8-sig", errors="replace")
     lines = re.split("\r\n|\n", text)
+    for number, line in enumerate(lines, start=1):
+        if "\r" in line.rstrip("\r"):
+            raise LogError(
+                f"{path}: line {number} holds carriage returns alone, without line feeds; save it "
+                "with line feeds"
+            )
     return lines[:-1] if len(head) >= LIMITS.head_bytes else lines  # the last one may break off
 
 

@@ -34,6 +34,8 @@ from algid.readers.messages.message_file import MessageChannel, MessageFile, Mes
 _FRAME = struct.Struct("<BQ")
 _INDEX = struct.Struct("<BQH4x")
 """Head of a message index: code, length, channel, bytes of its entries (16 each)."""
+_FOOTER_BYTES = 37
+"""Of a footer with the magic behind it; its checksum covers the summary and the first 25."""
 _HEAD = np.dtype("u1, <u8, <u2, <u4, <i8, <i8")
 """Of a message before its payload: code, length, channel, sequence, log time, publish time."""
 _MESSAGE_BYTES = _HEAD.itemsize - _FRAME.size
@@ -124,9 +126,9 @@ def mcap_file(path: Path) -> MessageFile:
     found, counts, promised, why = _Contents(), Counter[int](), Counter[int](), ""
     with path.open("rb", buffering=_BUFFER_BYTES) as stream:
         size = stream.seek(0, io.SEEK_END)
-        data_end = _walk(stream, size, found)
+        _walk(stream, size, found)
         try:
-            found.define(_summary(stream, data_end, size), 0)
+            found.define(_summary(stream, size), 0)
         except Exception as error:  # what the package raises of bytes that are no records
             why = str(error)
             found.records.clear()
@@ -135,11 +137,10 @@ def mcap_file(path: Path) -> MessageFile:
             promised.update(statistics.channel_message_counts)
             if any((Opcode.CHANNEL, number) not in found.records for number in promised):
                 statistics, why = None, "it counts messages of channels that it does not define"
-        if why:
-            found.damage.append(f"its summary: {why}")
+        found.damage += [f"its summary: {why}"] if why else []
         if not statistics or all(part.loose for part in found.parts):
-            numbers = {"case": "summary" if why else "none", "why": why}
-            found.notices.append(Notice("DAMAGED_INDEX", numbers=numbers))
+            case = "summary" if why else "none"
+            found.notices.append(Notice("DAMAGED_INDEX", numbers={"case": case, "why": why}))
         for part in found.parts:
             if part.loose or not statistics:
                 lost = found.read(stream, part, frozenset())
@@ -181,53 +182,57 @@ def _read(stream: IO[bytes], start: int, length: int) -> bytes:
     return content
 
 
-def _walk(stream: IO[bytes], size: int, found: _Contents) -> int:
-    """Find the parts of a file up to its end, or to its first break; 0, or where its data end."""
-    place, last, data_end, code = len(MCAP), _Part(0, 0, loose=False), 0, 0
+def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
+    """Find the parts of a file up to its end, or to its first break."""
+    place, last, data_end, code = len(MCAP), _Part(0, 0, loose=False), False, 0
     while code != Opcode.FOOTER:
         head = _read(stream, place, min(_INDEX.size, size - place))
         code, length, channel = _INDEX.unpack(head.ljust(_INDEX.size, b"\0"))
         end = place + _FRAME.size + length
-        if not code or end > size or (code == Opcode.MESSAGE and length < _MESSAGE_BYTES):
-            break
         follows, loose = last.start + last.length == place, code != Opcode.CHUNK
-        if code == Opcode.MESSAGE_INDEX and follows and not last.loose:
+        if (
+            end > size
+            or not (0 < code <= Opcode.DATA_END or code >= 0x80)
+            or (code == Opcode.MESSAGE and length < _MESSAGE_BYTES)
+            or (code == Opcode.MESSAGE_INDEX and (last.loose or not follows))  # its chunk is gone
+        ):
+            break
+        if code == Opcode.MESSAGE_INDEX:
             last.length = end - last.start
             if length > _INDEX.size - _FRAME.size:
                 last.counts = {**(last.counts or {}), channel: length // 16}
         elif code in (Opcode.CHUNK, Opcode.MESSAGE) or (code in _KINDS and not data_end):
-            data_end = 0  # it stood too early
+            data_end = False  # it stood too early
             if loose and follows and last.loose and last.length < _LOOSE_BYTES:
                 last.length = end - last.start
             else:
                 last = _Part(place, end - place, loose)
                 found.parts.append(last)
-        place, data_end = end, end if code == Opcode.DATA_END else data_end
+        place, data_end = end, data_end or code == Opcode.DATA_END
     left = size - place
     if data_end and (place < end or left <= len(MCAP)):
-        return data_end  # what breaks off behind the data is its summary
+        return  # what breaks off behind the data is its summary
     case = "chunk" if code == Opcode.CHUNK else "record" if left else "end"
     found.notices.append(Notice("CUT_OFF", numbers={"case": case, "first": place, "bytes": left}))
     found.damage.append(f"it breaks off at byte {place}")
     if case == "chunk":
         found.parts.append(_Part(place, left, loose=False))
-    return 0
 
 
-def _summary(stream: IO[bytes], start: int, size: int) -> Definitions:
-    """Code and content of what is defined behind the data, whose checksum covers the footer too.
+def _summary(stream: IO[bytes], size: int) -> Definitions:
+    """Code and content of what a file's summary defines: nothing where it has none.
 
     Raises
     ------
     ValueError
         If it is damaged.
     """
-    content = _read(stream, start, size - start) if start else b""
-    if not content.endswith(MCAP):
+    tail = _read(stream, size - _FOOTER_BYTES, _FOOTER_BYTES)
+    start, checksum = struct.unpack_from("<Q8xI", tail, _FRAME.size)
+    if not tail.endswith(MCAP):
         raise ValueError("the file has no end: it was cut off")
-    if (checksum := content[-12:-8]) != bytes(4) and zlib.crc32(content[:-12]) != int.from_bytes(
-        checksum, "little"
-    ):
+    content = _read(stream, start, size - _FOOTER_BYTES - start) if start else b""
+    if checksum and zlib.crc32(tail[:25], zlib.crc32(content)) != checksum:
         raise ValueError("its checksum is wrong")
     return _listed(content)[1]
 
@@ -240,8 +245,7 @@ def _records(stream: IO[bytes], part: _Part) -> tuple[Messages, NDArray[np.uint1
     ValueError
         If it is damaged; the libraries raise more.
     """
-    content, index = _read(stream, part.start, part.length), b""
-    checked = torn = False
+    content, index, checked, torn = _read(stream, part.start, part.length), b"", False, False
     if not part.loose:
         end = _FRAME.size + _FRAME.unpack_from(content)[1]
         torn, index = end > len(content), content[end:]
@@ -258,9 +262,8 @@ def _records(stream: IO[bytes], part: _Part) -> tuple[Messages, NDArray[np.uint1
     heads = gather(octets, offsets, f"V{_HEAD.itemsize}").view(_HEAD)
     sizes = heads["f1"].astype(np.int64) - _MESSAGE_BYTES
     log_ns = heads["f4"].astype(np.int64)
-    # nothing vouches for what is there of a torn chunk, which CUT_OFF says
-    messages = Messages(octets[:end], offsets + _HEAD.itemsize, sizes, log_ns, checked or torn)
-    return messages, heads["f2"], others
+    starts, checked = offsets + _HEAD.itemsize, checked or torn  # a torn one is told as such
+    return Messages(octets[:end], starts, sizes, log_ns, checked), heads["f2"], others
 
 
 def _unpacked(chunk: Chunk) -> bytes:

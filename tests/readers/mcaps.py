@@ -154,7 +154,7 @@ def protobuf_types(file: Any, name: str = "arm.State") -> tuple[bytes, Any]:
 def protobuf_schema() -> tuple[bytes, Any]:
     """A file descriptor set of a joint state, and the message class."""
     lists = ((name, 1, 3) for name in ("position", "velocity", "effort"))
-    file = protobuf_file(("timestamp", 11, 1), ("name", 9, 3), *lists, ("mode", 5, 1))
+    file = protobuf_file(("timestamp", 11, 1), ("name", 9, 3), *lists, ("mode", 17, 1))
     file.dependency.append("google/protobuf/timestamp.proto")
     file.message_type[0].field[0].type_name = ".google.protobuf.Timestamp"
     return protobuf_types(file)

@@ -283,6 +283,18 @@ def test_a_flipped_bit_costs_its_chunk_and_is_told(statistics: bool, tmp_path: P
     assert missing in lost(found)["DAMAGED"]
 
 
+@pytest.mark.parametrize("statistics", [True, False])
+def test_what_a_file_promises_is_counted_behind_a_chunk_that_is_called_another_record(
+    statistics: bool, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.mcap"
+    content = made(path, use_statistics=statistics)
+    found = beginning(path, poked(content, chunks_of(path)[3].chunk_start_offset, "<B", 0x86))
+    told = {"DAMAGED", "CUT_OFF"} if statistics else {"CUT_OFF"}
+    assert 0 < len(found) < 200
+    assert lost(found).keys() == told
+
+
 @pytest.mark.parametrize(("place", "value"), [(23, 31), (23, 1 << 40), (23, -8), (9, 7)])
 def test_a_message_index_that_lies_is_not_believed(place: int, value: int, tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"

@@ -185,6 +185,8 @@ def test_a_protobuf_number_written_in_another_type_is_no_number() -> None:
         pytest.param(13, [0, 128, 2**31, 2**32 - 1], id="uint32"),
         pytest.param(15, [0, -1, -(2**31)], id="sfixed32"),
         pytest.param(16, [0, -1, -(2**63)], id="sfixed64"),
+        pytest.param(17, [0, 1, -1, 2**31 - 1, -(2**31)], id="sint32"),
+        pytest.param(18, [0, 1, -1, 2**63 - 1, -(2**63)], id="sint64"),
     ],
 )
 def test_every_protobuf_number_is_read_as_protobuf_itself_wrote_it(

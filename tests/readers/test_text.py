@@ -161,6 +161,14 @@ def test_names_with_control_characters_do_not_break_a_message(tmp_path: Path) ->
     assert "\u202e" not in str(caught.value)
 
 
+@pytest.mark.parametrize("quote", ["", '"'])
+def test_lines_that_end_in_carriage_returns_alone_are_refused(quote: str, tmp_path: Path) -> None:
+    header = ",".join(f"{quote}{name}{quote}" for name in NAMES)
+    (tmp_path / "log.csv").write_bytes("\r".join([header, *ROWS[:30]]).encode())
+    with pytest.raises(LogError, match="carriage returns alone"):
+        read_log(tmp_path / "log.csv")
+
+
 def test_a_row_that_lacks_a_value_has_no_time_to_be_counted_by(tmp_path: Path) -> None:
     rows = [line.partition(",")[2] for line in ROWS]
     rows[7] = rows[7].rpartition(",")[0] + ","

@@ -33,7 +33,8 @@ class MisfitError(Exception):
 class Numbers:
     """`count` numbers side by side at byte `offset`: a NumPy type, or a varint in `width` bytes.
 
-    That is a "varint" in two's complement, or "unsigned". "zero" stands nowhere.
+    That is "varint" in two's complement, "unsigned", or "zigzag" with the sign in its lowest bit.
+    "zero" stands nowhere.
     """
 
     offset: int
@@ -149,12 +150,14 @@ class _Pattern:
         octets, columns = table.view(np.uint8), Columns()
         for name, at in (self.places or {}).items():
             start, rows = lead + at.offset, octets.shape[0]
-            if at.kind in ("varint", "unsigned"):
+            if at.kind in ("varint", "unsigned", "zigzag"):
                 # in base 128, the lowest seven bits first
                 digits = (octets[:, start : start + at.width] & 0x7F).astype(np.uint64)
                 total = np.bitwise_or.reduce(
                     digits << (7 * np.arange(at.width, dtype=np.uint64)), axis=1
                 )
+                if at.kind == "zigzag":
+                    total = (total >> np.uint64(1)) ^ (np.uint64(0) - (total & np.uint64(1)))
                 columns[name] = total if at.kind == "unsigned" else total.view(np.int64)
             elif at.kind == "zero":
                 columns[name] = np.zeros(rows)

@@ -21,7 +21,7 @@ from algid.base.limits import LIMITS
 from algid.readers.messages.layout import MessageLayout, MisfitError, Numbers
 
 _KINDS = {1: "<f8", 2: "<f4", 6: "<u8", 7: "<u4", 15: "<i4", 16: "<i8"}
-_KINDS |= dict.fromkeys((3, 5, 8, 13, 14), "varint") | {4: "unsigned"}
+_KINDS |= dict.fromkeys((3, 5, 8, 13, 14), "varint") | {4: "unsigned", 17: "zigzag", 18: "zigzag"}
 _STRING, _MESSAGE, _BYTES, _REPEATED = 9, 11, 12, 3
 _ZERO = Numbers(0, "zero")
 
@@ -155,10 +155,9 @@ class _Walk:
                 self.layout.pin(first, stop)
                 text = self.data[first:stop].decode("utf-8", errors="replace")
                 self.layout.texts[path] = (*self.layout.texts.get(path, ()), text)
-        elif wire == 0 and not width:
+        elif wire == 0 and kind and not width:
             self.layout.flags.extend(range(first, stop))
-            if kind:  # nobody logs a torque as sint32, which has another form
-                numbers[place] = Numbers(first, kind, 1, stop - first)
+            numbers[place] = Numbers(first, kind, 1, stop - first)
         elif wire in (1, 5) and width == stop - first:
             numbers[place] = Numbers(first, kind)
         elif wire != 2 or not (own.type == _BYTES or (repeated and kind and not width)):
