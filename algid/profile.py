@@ -15,7 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr,
 from algid.base.errors import SettingError
 from algid.base.files import misfit, read_toml
 from algid.base.limits import PHYSICAL, PRIOR_ERROR, within
-from algid.base.units import names_of, unit_of
+from algid.base.units import Quantity, names_of, unit_of
 from algid.options import Option, flag
 
 
@@ -24,16 +24,21 @@ def _usual(unit: object) -> object:
     return (unit_of(unit) or unit) if isinstance(unit, str) else unit
 
 
+def _unit(*quantities: Quantity) -> Any:
+    """One of the units of these quantities, by any of its names."""
+    return Annotated[Literal[names_of(*quantities)], BeforeValidator(_usual)]
+
+
 if TYPE_CHECKING:  # a type checker cannot read a registry
     AngleUnit = str
     VelocityUnit = str
     TorqueUnit = str
     TimeUnit = str
 else:
-    AngleUnit = Annotated[Literal[names_of("angle")], BeforeValidator(_usual)]
-    VelocityUnit = Annotated[Literal[names_of("velocity")], BeforeValidator(_usual)]
-    TorqueUnit = Annotated[Literal[names_of("torque", "current")], BeforeValidator(_usual)]
-    TimeUnit = Annotated[Literal[names_of("time")], BeforeValidator(_usual)]
+    AngleUnit = _unit("angle")
+    VelocityUnit = _unit("velocity")
+    TorqueUnit = _unit("torque", "current")
+    TimeUnit = _unit("time")
 Effort = Literal[
     "raw", "gravity-compensated", "friction-compensated", "external", "command", "current"
 ]
@@ -110,8 +115,8 @@ class Channel(_Strict):
 
     @property
     def column(self) -> str | None:
-        """The column or field that it is read from, where the user names it."""
-        return self.source
+        """The column or field that it is read from, where the user names it; a desired angle's."""
+        return getattr(self, "q_des", None) or self.source
 
 
 class Angle(Channel):
@@ -144,11 +149,6 @@ class Torque(Channel):
     kp: float | None = Field(default=None, gt=0)
     kd: float | None = Field(default=None, ge=0)
     q_des: str | None = None
-
-    @property
-    def column(self) -> str | None:
-        """The column that it is read from: a torque, or a desired angle."""
-        return self.q_des or self.source
 
 
 class Profile(_Strict):

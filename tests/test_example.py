@@ -7,10 +7,12 @@ from pathlib import Path
 import pytest
 
 import algid
-from algid.api.synth import ARM, FRICTION, LOGS, PAYLOAD, PROFILE
+from algid.api.synth import EXAMPLE, FRICTION, LOGS, PROFILE
+from algid.arm import CONSTANT_NAMES
 from algid.base.errors import OutputError
 from algid.inspection.checks import inspect_log
 from algid.profile import load_profile
+from algid.synth.cases import load_case
 from tests.processes import Outcome
 
 
@@ -48,8 +50,9 @@ def test_with_its_profile_the_arm_is_found(example: Path) -> None:
     """Within four standard deviations, and these a thousandth of the value."""
     profile = load_profile(example / PROFILE)
     result = algid.identify(example / "run1.csv", example / "loaded.csv", profile=profile)
-    truth = dict(zip(("k1", "k2", "k3", "k4", "k5", "k6", "k7"), ARM.constants(), strict=True))
-    truth |= {"f1": FRICTION[0], "f2": FRICTION[1], "m_p": PAYLOAD, "l1": ARM.l1}
+    case = load_case(str(EXAMPLE))
+    truth = dict(zip(CONSTANT_NAMES, case.arm.constants(), strict=True))
+    truth |= {"f1": FRICTION[0], "f2": FRICTION[1], "m_p": case.payload, "l1": case.arm.l1}
     for name, value in truth.items():
         found = result.estimates[name]
         assert abs(found.estimate - value) < 4 * found.std

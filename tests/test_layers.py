@@ -97,7 +97,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "fleet": room("arm errors files limits model notices progress report "
                   "significance text", "numpy polars scipy"),
     "api": room(
-        "arm batches designs errors exports files fleet identification "
+        "batches designs errors exports files fleet identification "
         "inspection limits log methods notices options physics profile progress "
         "readers report results runtime settings stores synth text tracks units writers",
         "numpy plotly polars pydantic",

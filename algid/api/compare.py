@@ -85,11 +85,7 @@ def compare(
 
 def page_of(out: Path) -> Path:
     """Where the page of a comparison goes."""
-    from algid.report.comparison import NAME
-
-    if out.suffix == ".html":
-        return out
-    return out / NAME
+    return out if out.suffix == ".html" else out / "compare.html"
 
 
 def answer(found: Comparison, given: Mapping[str, Any]) -> Answer:

@@ -241,8 +241,9 @@ def described(taker: Callable[..., Any]) -> tuple[list[str], dict[str, str]]:
 def refuse_unknown(options: Iterable[str], known: Collection[str]) -> None:
     """Raise `SettingError` at a name that is none of the known ones."""
     for name in options:
-        if name.partition(".")[0] not in known:
-            near = get_close_matches(name, known, n=1) or known
+        top = name.partition(".")[0]
+        if top not in known:
+            near = get_close_matches(top, known, n=1) or known
             raise SettingError(f"{name}: no setting has this name; expected {', '.join(near)}")
 
 

@@ -14,11 +14,10 @@ from pydantic import BeforeValidator
 
 from algid.api import Answer
 from algid.api.options import CASES, Folder, Seed, options_of, verb
-from algid.arm import Arm, FloatArray, with_payload
 from algid.base.errors import SettingError
 from algid.base.files import refuse_existing, whole_file
 from algid.base.limits import PHYSICAL, within
-from algid.log import Log, Truth
+from algid.log import Log
 from algid.options import Option, flag
 from algid.profile import parts_of
 from algid.synth import run
@@ -65,24 +64,19 @@ Schedule = Annotated[
 Moment = Annotated[datetime | date | str, Option(check=Annotated[Any, BeforeValidator(_moment)])]
 Noise = Annotated[float, within(PHYSICAL.noise)]
 
-ARM = Arm(
-    m1=1.2, m2=0.8, lc1=0.15, lc2=0.12, l1=0.30, l2=0.25, I1=0.010, I2=0.006, b1=0.50, b2=0.40,
-    g=9.81,
-)  # fmt: skip
+EXAMPLE = Path(__file__).with_name("example.toml")
 """The arm of the example logs, four runs with a real log's faults and one with a payload.
 
 Its angles are zero where it hangs straight down, and its log does not say so; its joints have dry
 friction, and its sensors noise and steps. What it truly is stands in none of the files.
 """
-PAYLOAD = 0.5
-"""kg, at the tip in ``loaded.csv``."""
 FRICTION = (0.4, 0.2)
 """N m of dry friction, which the motors overcome beside what moves the arm."""
 SENSORS = Sensors(torque_noise=0.02, encoder_bits=14)
 STRENGTH = 0.3
 """Of the torque that swings an arm round and round."""
-RATE, DURATION = 500.0, 10.0
-LOGS = {"run1": 0.0, "run2": 0.0, "run3": 0.0, "run4": 0.0, "loaded": PAYLOAD}
+RATE, DURATION, REST = 500.0, 10.0, np.zeros(2)
+LOGS = ("run1", "run2", "run3", "run4", "loaded")
 PROFILE = "arm.toml"
 PROFILE_TEXT = f"""\
 # What the logs of this arm do not say; `inspect LOG {flag("write_profile")} FILE` writes all.
@@ -256,18 +250,13 @@ def _drive(case: Case, given: str | Path | Log, hold: Any, recording: run.Acquis
 
 def example_logs() -> list[Log]:
     """The runs ``run1`` to ``run4``, and ``loaded``: each its own motion, angles from hanging."""
-    logs = []
-    for seed, (name, payload) in enumerate(LOGS.items()):
-        sensors = replace(SENSORS, seed=seed)
-        k = with_payload(ARM.constants(), ARM.payload_constants(payload))
-        strong = wide_multi_sine(ARM, seed=seed)
-
-        def drive(at: FloatArray, strong: Torque = strong) -> FloatArray:
-            return STRENGTH * strong(at)
-
-        motion = simulate(k, drive, sample_times(RATE, DURATION, sensors), HANGING, np.zeros(2))
+    logs, case = [], load_case(str(EXAMPLE))
+    for seed, name in enumerate(LOGS):
+        sensors, strong = replace(SENSORS, seed=seed), wide_multi_sine(case.arm, seed=seed)
+        k = case.constants(case.payload if name == "loaded" else 0.0)
+        t = sample_times(RATE, DURATION, sensors)
+        motion = simulate(k, lambda at: STRENGTH * strong(at), t, HANGING, REST)  # noqa: B023  # called at once
         tau = motion.tau + np.array(FRICTION)[:, None] * np.sign(motion.omega)
-        log = record(replace(motion, tau=tau), sensors, Truth(ARM, payload, "example"), name)
-        origin = replace(log.origin, truth=None)
-        logs.append(replace(log, theta=log.theta - HANGING[:, None], origin=origin))
+        log = record(replace(motion, tau=tau), sensors, None, name)
+        logs.append(replace(log, theta=log.theta - HANGING[:, None]))
     return logs

@@ -23,7 +23,6 @@ from algid.report.tables import settings_of
 from algid.results import Result
 from algid.results.rows import row_of
 
-NAME = "compare.html"
 FIRST = "{0.name} | {1} | {0.with_half} |  | {0.unit} | {0.status} | "
 OTHER = "{0.name} | {1} | {0.with_half} | {2:+.1f} | {0.unit} | {0.status} | {3}"
 ASIDE = re.compile(r"command|used\..*|.*told")

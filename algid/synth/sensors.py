@@ -55,7 +55,7 @@ def sample_times(rate: float, duration: float, sensors: Sensors) -> FloatArray:
     return np.round(t * 1e9) * 1e-9
 
 
-def record(motion: SimulatedMotion, sensors: Sensors, truth: Truth, name: str) -> Log:
+def record(motion: SimulatedMotion, sensors: Sensors, truth: Truth | None, name: str) -> Log:
     """The log of a motion as the sensors see it.
 
     Velocities are in it only where the angles are exact: an arm with encoders measures none.
