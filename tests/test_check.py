@@ -61,6 +61,7 @@ def test_one_limit_holds_for_every_row_with_a_truth() -> None:
         ("m_p", True),
     ]
     assert [row[2] for row in _judged(2.0)] == [2.0] * 4
+    assert [row[3] for row in _judged(0)] == [False, False, False, True]
 
 
 def test_a_file_names_the_rows_that_are_checked(tmp_path: Path) -> None:

@@ -67,8 +67,8 @@ def test_every_log_is_a_point_with_its_interval(tmp_path: Path) -> None:
     jobs = history.jobs.filter(robot="r0")
     plot = overview(history)
     assert plot is not None
-    titles = [one["text"] for one in plot.layout["annotations"]]
-    assert titles == ["<b>r0: k6, N m s/rad</b>", "<b>r0: m_p, kg</b>"]
+    titles = [(one["text"], one["x"]) for one in plot.layout["annotations"]]
+    assert titles == [("<b>r0: k6, N m s/rad</b>", 0), ("<b>r0: m_p, kg</b>", 0)]
     points, mean, found = (named(plot.data, name)[0] for name in ("log", "mean", "finding"))
     assert typed(points["x"]) == pytest.approx(jobs["time"].dt.epoch("ms").to_list(), rel=1e-9)
     assert typed(points["y"]) == pytest.approx(jobs["k6"].to_list(), rel=1e-6)

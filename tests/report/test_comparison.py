@@ -82,6 +82,8 @@ def test_the_page_draws_each_distance_beside_what_chance_explains(
         write_comparison(found, path, force=False)
     page = Page(path.read_text(encoding="utf-8"))
     first, second = page.figures["distances"]["data"]
+    (chance,) = page.figures["distances"]["layout"]["shapes"]
+    assert [chance["x0"], chance["x1"]] == pytest.approx([-1.96, 1.96], abs=1e-3)
     assert typed(first["x"])[:3] == pytest.approx([1.0, 1.0, 0.0])
     assert typed(second["x"])[:2] == pytest.approx([-5.0, -5.0])
     assert first["marker"]["symbol"] != second["marker"]["symbol"]

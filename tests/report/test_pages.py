@@ -8,6 +8,7 @@ import hashlib
 import html
 import json
 import re
+from collections import Counter
 from importlib import resources
 from pathlib import Path
 
@@ -31,7 +32,7 @@ from algid.results import (
 )
 from algid.results.rows import rows_of
 from tests.report.folders import HOSTILE, hostile
-from tests.report.pages import Page
+from tests.report.pages import Page, typed
 
 FIGURES = [
     "intervals", "torque", "closeup", "residual", "running", "signals", "coverage",
@@ -127,8 +128,13 @@ def test_every_figure_is_there_and_plotly_takes_it(folder: Path) -> None:
     for figure in figures.values():
         made = go.Figure(figure)  # which refuses what its script does not know
         assert len(made.data) == len(figure["data"]) > 0
+        held = Counter(trace["xaxis"] for trace in figure["data"])
+        assert max(held.values()) - min(held.values()) <= 1  # panels show as much
+        assert len(held) == sum(name.startswith("xaxis") for name in figure["layout"])
         for trace in figure["data"]:
             assert trace["xaxis"].replace("x", "y") == trace["yaxis"]  # of one panel
+            if isinstance(trace["x"], dict) and isinstance(trace["y"], dict):
+                assert typed(trace["x"]).size == typed(trace["y"]).size
 
 
 def test_only_the_pages_own_scripts_run_and_nothing_is_asked_of_any_host(folder: Path) -> None:

@@ -22,7 +22,7 @@ def test_links_are_as_long_as_the_payload_or_the_constants_have_it(
 ) -> None:
     known = {name: Estimate(estimate=value, unit="m") for name, value in (("l1", 0.3), ("l2", 0.2))}
     long = arm(result.model_copy(update={"payload": known}), raw)
-    assert (long.l1, long.l2, long.payload) == (0.3, 0.2, "")
+    assert (long.l1, long.l2, long.payload, long.aside) == (0.3, 0.2, "", 0.0)
     k1, k2 = (Estimate(estimate=value, unit="") for value in (0.2, 9.81 * 0.2 / 0.25))
     bare = {
         "payload": {},
