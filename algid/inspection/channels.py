@@ -11,7 +11,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from algid.arm import FloatArray
 from algid.base.criteria import CUT
 from algid.base.quantiles import median, medians, quantile
 from algid.estimators.saturation import UNSEEN, Limit, Saturation, saturation_of
@@ -35,6 +37,8 @@ LOOKED_AT = 1 << 18
 """Samples at the beginning of logs in which limits are looked for."""
 _DENORMAL = 1e-6
 _SPIKE = 30.0
+_MARKS, _IN_A_ROW = 8, 3
+"""Samples of one value that are spikes: least of them, and most in a row."""
 _STANDS, _CLEAR = 0.4, 6.0
 """Turning points: share of the speed three samples off, and that speed over the noise."""
 _DEAD, _DEAD_RUNS = 0.1, 20
@@ -192,11 +196,16 @@ def spikes(log: Log) -> Iterator[Notice]:
 
     They lie thirty times further off the middle of their neighbours than noise and bends of the
     signal do, and so do these neighbours for their sake. The sample after a step fits what follows,
-    and a pulse of the torque where the joint turns back is dry friction's.
+    and a pulse of the torque where the joint turns back is dry friction's. Of many spikes those
+    count that hold one value, as where a driver writes 0 for a torque that it has missed.
     """
     if len(log) < 20:
         return
     for name, values in channels(log):
+        if (marks := _marks(values)).size:
+            seen = {"count": marks.size, "start": float(log.t[marks[0]])}
+            yield _found("SENSOR_FAULT", log.origin, name, case="spikes", **seen)
+            continue
         off = values[1:-1] - 0.5 * (values[:-2] + values[2:])
         size = np.abs(off)
         limit = _SPIKE * max(robust_deviation(off), quantile(thinned(size), 0.9))
@@ -218,6 +227,33 @@ def spikes(log: Log) -> Iterator[Notice]:
         if places.size:
             seen = {"count": len(places), "start": float(log.t[places[0]])}
             yield _found("SENSOR_FAULT", log.origin, name, case="spikes", **seen)
+
+
+def _marks(values: FloatArray) -> NDArray[np.intp]:
+    """Places of samples that hold the commonest value and lie off the line between those around.
+
+    None unless these are most of the samples that hold it, three in a row at most. They would be
+    noise to `spikes`, which looks at the tenth of the samples that bends the most.
+    """
+    every, counts = np.unique(values, return_counts=True)
+    common = values == every[np.argmax(counts)]
+    here, rest = np.flatnonzero(common), np.flatnonzero(~common)
+    if here.size < _MARKS or rest.size < 20:
+        return here[:0]
+    others = values[rest]
+    bend = others[1:-1] - 0.5 * (others[:-2] + others[2:])
+    if (even := rest[2:] - rest[:-2] == 2).any():
+        bend = bend[even]
+    limit = _SPIKE * max(robust_deviation(bend), quantile(thinned(np.abs(bend)), 0.9))
+    behind = np.searchsorted(rest, here)
+    inner = (behind > 0) & (behind < rest.size)
+    here, behind = here[inner], behind[inner]
+    before, after = others[behind - 1], others[behind]
+    off = np.abs(values[here] - 0.5 * (before + after))
+    short = rest[behind] - rest[behind - 1] <= _IN_A_ROW + 1
+    marks = here[short & (off > limit) & (np.abs(after - before) < 0.2 * off)]
+    enough = limit > 0 and marks.size > max(_MARKS, 0.5 * np.count_nonzero(common))
+    return marks if enough else marks[:0]
 
 
 def saturation(*logs: Log, gravity: float = 9.81, effort: str | None = None) -> Saturation:

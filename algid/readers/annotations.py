@@ -10,8 +10,9 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from algid.base.limits import LIMITS
 from algid.base.units import CURRENT, NANOSECONDS, TORQUE, is_foreign, unit_of
 from algid.log import KEY, IntArray, Reading, usual_period
 from algid.notices import Notice, Remedy
@@ -81,7 +82,7 @@ def units_in(metadata: Mapping[str, str], columns: Sequence[str]) -> dict[str, s
     return units
 
 
-def _object(text: str) -> dict[str, object]:
+def _object(text: str) -> dict[str, Any]:
     """What a JSON object holds; empty where a text is none."""
     try:
         content = json.loads(text)
@@ -111,15 +112,23 @@ def _called(name: str, columns: Sequence[str]) -> list[str]:
 
 
 def in_json_schema(text: str) -> tuple[dict[str, str], list[str]]:
-    """By name the unit that a JSON schema has for a property, as metadata; its descriptions."""
-    units, lines = {}, []
-    properties = _object(text).get("properties")
-    for name, one in properties.items() if isinstance(properties, dict) else ():
-        if isinstance(one, dict):
-            for key in ("unit", "units"):
-                if isinstance(one.get(key), str):
-                    units[f"{name}.unit"] = one[key]
+    """By name the unit that a JSON schema has for a property, as metadata; its descriptions.
+
+    A list's may stand at its items, and properties within properties: ``state.effort``.
+    """
+    units, lines, waiting = dict[str, str](), list[str](), [("", _object(text), 0)]
+    for name, one, depth in waiting:
+        for key in ("unit", "units"):
+            if isinstance(one.get(key), str):
+                units[f"{name}.unit"] = one[key]
+        if name:
             lines.append(f"{name}: {one.get('description', '')}")
+        properties = one.get("properties")
+        inner = properties.items() if isinstance(properties, dict) else ()
+        within = [(f"{name}.{own}".lstrip("."), content) for own, content in inner]
+        within.append((name, one.get("items")))
+        if depth < LIMITS.definition_depth:
+            waiting += [(own, part, depth + 1) for own, part in within if isinstance(part, dict)]
     return units, lines
 
 

@@ -253,6 +253,16 @@ def test_spikes_are_counted_in_every_channel(name: str) -> None:
     assert found.text == f"{name} has 3 spikes, the first at t = 0.25 s"
 
 
+@pytest.mark.parametrize("share", [0.05, 0.2, 0.5])
+def test_many_spikes_of_one_value_are_counted_and_a_value_that_fits_is_none(share: float) -> None:
+    tau1 = 9 + np.sin(T) + 1e-3 * NOISE[2]
+    missed = np.random.default_rng(1).random(T.size) < share
+    coarse = np.round(np.sin(5 * T) + 1e-3 * NOISE[3], 1)  # at 0 for many samples
+    (found,) = of_codes(of_signals(logged(tau1=np.where(missed, 0, tau1), tau2=coarse)), *SPIKES)
+    assert found.text.startswith("tau1 has")
+    assert found.numbers["count"] == pytest.approx(missed.sum(), rel=0.3)
+
+
 @pytest.mark.parametrize("period", [math.sqrt(53), math.sqrt(137), math.sqrt(1623)])
 def test_samples_in_a_period_are_those_of_the_faster_joint(period: float) -> None:
     """Phases are spread evenly: medians of first and second differences are of one phase."""

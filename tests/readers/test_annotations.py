@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pytest
+from mcap.writer import Writer
 
 from algid.base.errors import LogError
 from algid.profile import Profile
@@ -93,3 +96,24 @@ def test_topics_that_share_no_row_are_refused(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("\n".join([",".join(COLUMNS), *rows]) + "\n")
     with pytest.raises(LogError, match="no row has a value in every column"):
         read_log(tmp_path / "log.csv")
+
+
+def test_a_unit_of_a_json_schema_may_stand_at_a_lists_items(tmp_path: Path) -> None:
+    number = {"type": "number", "unit": "mNm"}
+    effort = {"type": "array", "items": number, "description": "measured"}
+    schema = {"properties": {"state": {"type": "object", "properties": {"effort": effort}}}}
+    path, messages = tmp_path / "log.mcap", list[bytes]()
+    for place in range(20):
+        state = {"name": ["a", "b"], "position": [place, -place], "effort": [place + 1, 2 - place]}
+        messages.append(json.dumps({"state": state}).encode())
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        kind = writer.register_schema("arm", "jsonschema", json.dumps(schema).encode())
+        channel = writer.register_channel("/state", "json", kind)
+        for place, content in enumerate(messages):
+            writer.add_message(channel, place * 10**7, content, place * 10**7)
+        writer.finish()  # type: ignore[no-untyped-call]
+    log = read_log(path)
+    assert log.tau[0] == pytest.approx(1e-3 * np.arange(1, 21))
+    assert log.origin.reading.channels["tau2"].unit == "mN m"
