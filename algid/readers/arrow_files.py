@@ -29,7 +29,9 @@ def open_parquet(path: Path) -> TableFile:
         about = pq.read_metadata(path)
         schema = about.schema.to_arrow_schema()
         names = set(schema.names)  # damaged ones are no text
-        text = (about.metadata or {}).get(KEY.encode())
+        # Arrow's schema lacks what its writer, or another one, states beside it
+        schema = schema.with_metadata({**(about.metadata or {}), **(schema.metadata or {})})
+        text = schema.metadata.get(KEY.encode())
     with as_log_error(path, "truth in the Parquet"):
         companion = Companion(None, {}) if text is None else loads(text)
     notices: tuple[Notice, ...] = ()

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from algid.base.errors import OutputError, SettingError
 from algid.log import Log, Truth, add, word_sum
 
+UNITS = {"theta": "rad", "q_des": "rad", "tau": "N m"}
+"""What a file states of its channels, so that a profile of the log it was made of is not applied
+again without a word."""
 FORMATS = ("mcap", "parquet", "csv")
 
 

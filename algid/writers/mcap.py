@@ -5,6 +5,7 @@ The angles that a controller was to follow are the positions of /joint_reference
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from algid.base.files import whole_file
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION, headed
 from algid.log import KEY, Companion, Log, Truth
+from algid.writers import UNITS
 
 TOPIC = "/joint_states"
 REFERENCES = "/joint_references"
@@ -31,6 +33,9 @@ _QOS = """\
   liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
   avoid_ros_namespace_conventions: false
 """
+
+_UNITS = {"position": UNITS["theta"], "effort": UNITS["tau"]}
+_METADATA = {"offered_qos_profiles": _QOS, "units": json.dumps(_UNITS)}
 
 
 def write(
@@ -55,8 +60,7 @@ def write(
             written = messages(path, block)
             for topic in written:
                 if topic not in channels:
-                    qos = {"offered_qos_profiles": _QOS}
-                    channels[topic] = writer.register_channel(topic, "cdr", schema, qos)
+                    channels[topic] = writer.register_channel(topic, "cdr", schema, _METADATA)
             for place, stamp in enumerate(block.stamp_ns.tolist()):
                 for topic, rows in written.items():
                     content = rows[place].tobytes()

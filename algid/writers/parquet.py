@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from algid.base.arrow import table_of_columns
 from algid.base.errors import OutputError
 from algid.base.files import whole_file
 from algid.log import KEY, Companion, Log, Truth
-from algid.writers import columns
+from algid.writers import UNITS, columns
 
 
 def write(
@@ -41,7 +42,9 @@ def write(
                 writer.write_table(table)
             if writer is None:
                 raise OutputError(f"{path}: there is no sample to write")
-            writer.add_key_value_metadata({KEY: Companion(truth, sums).dumps()})
+            units = {name: unit for name in sums if (unit := UNITS.get(name[:-1]))}
+            stated = {KEY: Companion(truth, sums).dumps(), "units": json.dumps(units)}
+            writer.add_key_value_metadata(stated)
         finally:
             if writer is not None:
                 writer.close()

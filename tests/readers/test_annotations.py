@@ -6,10 +6,12 @@ import json
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pyarrow as pa
 import pytest
 from mcap.writer import Writer
 
+import algid
 from algid.base.errors import LogError
 from algid.profile import Profile
 from algid.readers import open_log, read_log
@@ -117,3 +119,23 @@ def test_a_unit_of_a_json_schema_may_stand_at_a_lists_items(tmp_path: Path) -> N
     log = read_log(path)
     assert log.tau[0] == pytest.approx(1e-3 * np.arange(1, 21))
     assert log.origin.reading.channels["tau2"].unit == "mN m"
+
+
+def test_units_among_the_key_values_of_parquet_hold_whoever_wrote_them(tmp_path: Path) -> None:
+    columns = {name: np.arange(20.0) for name in COLUMNS}
+    units = {"units": json.dumps({"tau1": "mNm", "tau2": "mNm"})}
+    pl.DataFrame(columns).write_parquet(tmp_path / "log.parquet", metadata=units)
+    assert read_log(tmp_path / "log.parquet").tau[0, 1] == pytest.approx(1e-3)
+
+
+@pytest.mark.parametrize("form", ["mcap", "parquet"])
+def test_a_unit_that_was_converted_is_not_applied_again_without_a_word(
+    form: str, tmp_path: Path
+) -> None:
+    (tmp_path / "log.csv").write_text(table("above"))
+    converted = tmp_path / f"log.{form}"
+    algid.convert(tmp_path / "log.csv", converted, torque_unit="mNm", angle_unit="deg")
+    assert read_log(converted).tau[0, 1] == pytest.approx(15e-3)
+    assert not open_log(converted).notices
+    again = open_log(converted, Profile(torque_unit="mNm")).notices
+    assert {one.key for one in again} == {"OTHER_UNIT:stated"}
