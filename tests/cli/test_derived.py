@@ -247,6 +247,10 @@ def test_help_has_every_keyword_the_example_and_the_exit_codes(name: str) -> Non
 def test_identify_shows_ten_everyday_options_and_a_line_each() -> None:
     lines = call("identify", "--help").out.splitlines()
     assert lines[0] == "Usage: algid identify [OPTIONS] UNLOADED..."
+    assert any("--format" in line and line.endswith(" What to print.") for line in lines)
+    assert any(line.startswith("  --joints A,B ") for line in lines)
+    bare = call()
+    assert (bare.code, bare.out) == (2, call("--help").out)
     assert len(lines) <= 90
     everyday = lines[lines.index("Options:") + 1 : lines.index("Advanced:") - 1]
     assert len(everyday) == 10
@@ -317,6 +321,7 @@ def test_tables_of_the_guide_and_the_readme_are_those_of_the_code() -> None:
             lambda: algid.identify({}, windows=2.0),  # type: ignore[call-arg]
             "windows: no setting has this name; expected window$",
         ),
+        (lambda: algid.Settings(windows=2.0), "--windows"),  # type: ignore[call-arg]
         (lambda: algid.inspect({}, zero="down"), "--zero"),  # type: ignore[arg-type]
         (lambda: algid.inspect({}, joints="one"), "--joints"),
         (lambda: algid.identify({}, export="csv"), "--export"),  # type: ignore[arg-type]
