@@ -168,8 +168,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "a,b",
         "-o",
         str(out),
+        "--format",
+        "json",
     )
     assert code == 0, text
+    plain, _, wrote = text.partition("\nwrote ")
+    assert wrote == f"{out / 'case1.design'}\n"
+    assert json.loads(plain) == json.loads((out / "case1.design/design.json").read_text())
     return out / "case1.design"
 
 
