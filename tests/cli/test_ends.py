@@ -18,6 +18,7 @@ import pytest
 
 import algid
 from algid.api.batch import answer
+from algid.api.design import answer as planned_answer
 from algid.api.options import stem_of
 from algid.base.errors import SettingError
 from algid.batches.jobs import Job, JobRecord, JobStatus
@@ -93,6 +94,13 @@ def test_a_batch_says_what_it_ran_anew_and_what_it_passed_over() -> None:
     assert record == "out/b.json: no record of a job (torn); it counts as none: remove it"
     assert links == ("links to folders are not entered (mon); name what they lead to as sources")
     assert told.exit == 0
+
+
+@pytest.mark.parametrize(("lacks", "code"), [([], 0), (["k5"], 3)])
+def test_a_design_that_leaves_a_parameter_open_ends_with_3(lacks: list[str], code: int) -> None:
+    planned: Any = SimpleNamespace(open_parameters=lacks)
+    told = planned_answer(planned, {"prior": "case1", "out": Path()})
+    assert (told.exit, told.remarks) == (code, ["wrote case1.design"])
 
 
 def test_commands_say_where_their_files_are(

@@ -56,12 +56,15 @@ def result(files: tuple[Path, Path]) -> TrackResult:
     return track_log(*files, l1=CASE.arm.l1, l2=CASE.arm.l2)
 
 
-def test_a_track_with_one_stretch_that_says_nothing_ends_with_three(result: TrackResult) -> None:
+def test_a_track_with_one_stretch_that_says_nothing_ends_with_3_and_of_a_cut_log_with_4(
+    result: TrackResult,
+) -> None:
     first, *others = result.track.stretches
     silent = replace(result.track, stretches=[replace(first, std=1e9), *others])
     partly, given = replace(result, track=silent), {"log": "a.mcap", "out": Path()}
     assert not verdict(partly).failed
-    assert (answer(result, given).exit, answer(partly, given).exit) == (0, 3)
+    ends = [answer(one, given).exit for one in (result, partly, replace(result, data_lost=True))]
+    assert ends == [0, 3, 4]
 
 
 def test_the_mcap_bears_the_stamps_of_the_log(result: TrackResult, tmp_path: Path) -> None:
