@@ -99,15 +99,19 @@ def draft_profile(found: Inspection) -> str:
 
     reading, mapping, options = found.reading, found.mapping or {}, options_of(Profile)
     main, *_ = *reading.topics, ""
-    sources = {name: mapping.get(name, "").removeprefix(f"{main}: ") for name in ("t", *CHANNELS)}
-    time = sources.pop("t")
+    time = mapping.get("t", "")
     if time not in [one.name for one in found.entries]:  # of messages it is none of them
         time = ""
+    channels = {}
+    for name in CHANNELS:
+        source = mapping.get(name, "")
+        topic = next((one for one in reading.topics if source.startswith(f"{one}: ")), "")
+        channels[name] = "" if topic == main else topic, source.removeprefix(f"{topic}: ")
     known = {"topic": main, "joints": reading.joints, "time": time, "time_unit": reading.time_unit}
     text = template(Path(__file__).parents[1] / "inspection/algid.toml.j2").render(
         found=found,
         known=known,
-        sources=sources,
+        channels=channels,
         units={name: options[f"{name}.unit"].words for name in CHANNELS},
         toml=as_toml,
         visible=visible,

@@ -20,13 +20,13 @@ from algid.inspection.conventions import judged, mend, mends, recorded
 from algid.inspection.figures import dynamic_figures
 from algid.log import Log, Origin, Reading
 from algid.notices import Notice, Remedy
-from algid.profile import load_profile
+from algid.profile import Profile, load_profile, with_settings
 from algid.readers import read_log
-from algid.readers.table import CHANNELS
+from algid.readers.table import CHANNELS, JOINT_CHANNELS
 from tests.cli.commands import profile_from
 from tests.inspection.test_checks import K, moving_log, noticed
 from tests.readers.logs import EPOCH_NS
-from tests.readers.mcaps import joint_state, write_mcap
+from tests.readers.mcaps import ANY, joint_state, write_mcap
 
 
 def test_conventions_are_judged_over_all_stretches() -> None:
@@ -251,6 +251,19 @@ def test_a_draft_reads_its_log_whatever_its_joints_are_called(name: str, tmp_pat
     found = read_log(tmp_path / "arm.mcap", load_profile(tmp_path / "algid.toml"))
     assert found.origin.mapping["theta1"] == f"/{name}: position[{name}]"
     assert "STATED_UNUSED" not in {notice.code for notice in found.notices}
+
+
+def test_a_draft_reads_signals_of_several_topics_whatever_these_are_called(tmp_path: Path) -> None:
+    texts = {"enc": b'{"q":[1,2]}', "a: b": b'{"tau":[3,4]}'}
+    messages = [(one, EPOCH_NS + step * 10**6, texts[one]) for step in range(9) for one in texts]
+    write_mcap(tmp_path / "arm.mcap", messages, ANY)
+    own: dict[str, Any] = {"topic": "enc", "tau1.topic": "a: b", "tau2.topic": "a: b"}
+    for name, place in zip(JOINT_CHANNELS, ("q[0]", "q[1]", "tau[0]", "tau[1]"), strict=True):
+        own[f"{name}.source"] = place
+    given = with_settings(Profile(), own)
+    (tmp_path / "algid.toml").write_text(draft_profile(inspect_log(tmp_path / "arm.mcap", given)))
+    found = read_log(tmp_path / "arm.mcap", load_profile(tmp_path / "algid.toml"))
+    assert (found.theta[:, 0].tolist(), found.tau[:, 0].tolist()) == ([1, 2], [3, 4])
 
 
 def test_a_draft_of_a_log_that_cannot_be_read_says_why_and_names_what_is_there(
