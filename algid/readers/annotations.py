@@ -73,7 +73,7 @@ def units_in(metadata: Mapping[str, str], columns: Sequence[str]) -> dict[str, s
     for key, value in metadata.items():
         named: Mapping[str, object] = {}
         if key.lower() in ("unit", "units"):
-            named = _object(value)
+            named = object_in(value)
         elif match := _UNIT_KEY.fullmatch(key):
             named = {match[1] or match[2]: value}
         for name, unit in named.items():
@@ -82,7 +82,7 @@ def units_in(metadata: Mapping[str, str], columns: Sequence[str]) -> dict[str, s
     return units
 
 
-def _object(text: str) -> dict[str, Any]:
+def object_in(text: str) -> dict[str, Any]:
     """What a JSON object holds; empty where a text is none."""
     try:
         content = json.loads(text)
@@ -116,7 +116,7 @@ def in_json_schema(text: str) -> tuple[dict[str, str], list[str]]:
 
     A list's may stand at its items, and properties within properties: ``state.effort``.
     """
-    units, lines, waiting = dict[str, str](), list[str](), [("", _object(text), 0)]
+    units, lines, waiting = dict[str, str](), list[str](), [("", object_in(text), 0)]
     for name, one, depth in waiting:
         for key in ("unit", "units"):
             if isinstance(one.get(key), str):
@@ -137,7 +137,7 @@ def lines_of(metadata: Mapping[str, str]) -> Iterator[str]:
     for key, value in metadata.items():
         if key in ("pandas", "ARROW:schema", KEY):
             continue
-        known = key.lower() in ("unit", "units") and _object(value)
+        known = key.lower() in ("unit", "units") and object_in(value)
         if not (known or _UNIT_KEY.fullmatch(key)):
             yield f"{key}: {value}"
 

@@ -111,7 +111,21 @@ def _of_hdf5(path: Path) -> Read:
     arrays: Arrays = {}
     attributes: dict[str, dict[str, str]] = {}
 
+    of_groups: dict[str, dict[str, str]] = {}
+
     def take(name: str, one: Any) -> None:
+        if isinstance(one, h5py.Group):  # before what it holds
+            stated = {
+                key: text_of(value) for key, value in one.attrs.items() if "unit" in key.lower()
+            }
+            of_groups[name] = {key: stated.pop(key) for key in ("unit", "units") if key in stated}
+            for key, value in stated.items():
+                if metadata.setdefault(key, value) != value:
+                    raise LogError(
+                        f"{path}: its groups state {key} as {metadata[key]!r:.40} and as "
+                        f"{value!r:.40}; state the unit of each dataset by its own attribute"
+                    )
+            return
         if not isinstance(one, h5py.Dataset) or one.is_virtual or one.external or one.ndim > 2:
             return
         kinds = {kind.kind for kind, *_ in (one.dtype.fields or {"": (one.dtype,)}).values()}
@@ -130,15 +144,16 @@ def _of_hdf5(path: Path) -> Read:
                 "off or damaged, save it again"
             )
         plain, values = name.replace("/", "."), np.asarray(one[()])
-        attributes[plain] = {key: text_of(value) for key, value in one.attrs.items()}
+        inherited = of_groups.get(name.rpartition("/")[0], {})
+        attributes[plain] = inherited | {key: text_of(value) for key, value in one.attrs.items()}
         if values.dtype.names:
             arrays.update({f"{plain}.{each}": values[each] for each in values.dtype.names})
         else:
             arrays[plain] = np.atleast_1d(values)
 
     with h5py.File(path, "r") as file:
-        file.visititems(take)
         metadata = {key: text_of(value) for key, value in file.attrs.items()}
+        file.visititems(take)
     return arrays, attributes, metadata
 
 

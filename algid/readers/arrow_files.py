@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from algid.log import CANONICAL_COLUMNS, KEY, Companion, loads
 from algid.notices import Notice
 from algid.readers.flat import as_log_error
-from algid.readers.table_cells import BATCH_ROWS, TableFile
+from algid.readers.table_cells import BATCH_ROWS, TableFile, attributed
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -31,6 +31,7 @@ def open_parquet(path: Path) -> TableFile:
         names = set(schema.names)  # damaged ones are no text
         # Arrow's schema lacks what its writer, or another one, states beside it
         schema = schema.with_metadata({**(about.metadata or {}), **(schema.metadata or {})})
+        schema = attributed(schema)
         text = schema.metadata.get(KEY.encode())
     with as_log_error(path, "truth in the Parquet"):
         companion = Companion(None, {}) if text is None else loads(text)
@@ -70,7 +71,7 @@ def open_feather(path: Path) -> TableFile:
                     yield batch.slice(first, BATCH_ROWS)
 
     with as_log_error(path, "Feather"), pa.memory_map(str(path)) as source:
-        schema = pa.ipc.open_file(source).schema
+        schema = attributed(pa.ipc.open_file(source).schema)
         names = list(schema.names)  # damaged ones are no text
         # one column tells the rows; the others need not be unpacked for it
         options = pa.ipc.IpcReadOptions(included_fields=[0])

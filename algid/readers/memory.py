@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 from algid.base.errors import LogError, SettingError
 from algid.log import Log
 from algid.readers.arrays import of_arrays, of_arrow
-from algid.readers.table_cells import TableFile, decoded
+from algid.readers.table_cells import TableFile, attributed
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -175,14 +174,5 @@ def open_columns(given: FrameOrArrays) -> TableFile:
         ) from error
     attributes = getattr(given, "attrs", None)  # of pandas
     if isinstance(attributes, Mapping) and attributes:
-        fields, metadata = [], dict[str, str]()
-        for field in table.schema:
-            own = attributes.get(field.name)
-            said = {str(k): str(v) for k, v in own.items()} if isinstance(own, Mapping) else {}
-            fields.append(field.with_metadata(decoded(field.metadata) | said))
-        for key, value in attributes.items():
-            if key not in table.schema.names:
-                text = json.dumps(value, default=str) if isinstance(value, Mapping) else str(value)
-                metadata[str(key)] = text
-        table = table.cast(pa.schema(fields, metadata=metadata))
+        table = table.cast(attributed(table.schema, attributes))
     return of_arrow(NAME, "frame", table)

@@ -22,7 +22,7 @@ from algid.base.limits import LIMITS
 from algid.base.text import repeated
 from algid.log import Companion
 from algid.notices import Notice
-from algid.readers.annotations import BAD, GOOD, GROUPS, several, units_in
+from algid.readers.annotations import BAD, GOOD, GROUPS, object_in, several, units_in
 from algid.readers.column_names import STEMS
 
 if TYPE_CHECKING:
@@ -357,6 +357,31 @@ def decoded(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
     for key, value in (metadata or {}).items():
         texts[key.decode(errors="replace")] = value.decode(errors="replace")
     return texts
+
+
+def attributed(schema: pa.Schema, attributes: Mapping[str, Any] | None = None) -> pa.Schema:
+    """A schema with the attributes of a pandas frame, or those that pandas saved with it.
+
+    Those by a column's name are the column's, others the table's.
+    """
+    import pyarrow as pa
+
+    metadata = decoded(schema.metadata)
+    if attributes is None:
+        saved = object_in(metadata.pop("PANDAS_ATTRS", ""))  # by pandas itself, or by Arrow
+        attributes = saved or object_in(metadata.get("pandas", "")).get("attributes")
+        if not isinstance(attributes, Mapping):
+            return schema
+    fields = []
+    for one in schema:
+        own = attributes.get(one.name)
+        said = {str(k): str(v) for k, v in own.items()} if isinstance(own, Mapping) else {}
+        fields.append(one.with_metadata(decoded(one.metadata) | said))
+    for key, value in attributes.items():
+        if key not in schema.names:
+            text = json.dumps(value, default=str) if isinstance(value, Mapping) else str(value)
+            metadata[str(key)] = text
+    return pa.schema(fields, metadata=metadata)
 
 
 def is_text(kind: pa.DataType) -> bool:

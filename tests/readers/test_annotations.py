@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
+import h5py
 import numpy as np
+import pandas as pd
 import polars as pl
 import pyarrow as pa
 import pytest
@@ -139,3 +142,32 @@ def test_a_unit_that_was_converted_is_not_applied_again_without_a_word(
     assert not open_log(converted).notices
     again = open_log(converted, Profile(torque_unit="mNm")).notices
     assert {one.key for one in again} == {"OTHER_UNIT:stated"}
+
+
+@pytest.mark.parametrize("form", ["parquet", "feather"])
+@pytest.mark.parametrize(
+    "stated", [{"torque_unit": "mNm"}, {"tau1": {"unit": "mNm"}, "tau2": {"unit": "mNm"}}]
+)
+def test_attributes_that_pandas_saved_hold(
+    form: str, stated: dict[str, Any], tmp_path: Path
+) -> None:
+    frame = pd.DataFrame({name: np.arange(20.0) for name in COLUMNS})
+    frame.attrs = stated
+    getattr(frame, f"to_{form}")(tmp_path / "log")
+    assert read_log(tmp_path / "log").tau[:, 1] == pytest.approx([1e-3, 1e-3])
+
+
+@pytest.mark.parametrize("place", ["group", "quantity"])
+def test_units_of_an_hdf5_group_are_those_of_its_datasets(place: str, tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        group = file.create_group("log")
+        torques = group if place == "group" else file.create_group("torque")
+        torques.attrs["torque_unit" if place == "group" else "units"] = "mNm"
+        for name in COLUMNS:
+            (torques if name.startswith("tau") else group)[name] = np.arange(20.0)
+    assert read_log(tmp_path / "log.h5").tau[:, 1] == pytest.approx([1e-3, 1e-3])
+    with h5py.File(tmp_path / "log.h5", "a") as file:
+        file.create_group("other").attrs["torque_unit"] = "kNm"
+        file["log"].attrs["torque_unit"] = "mNm"
+    with pytest.raises(LogError, match="groups state torque_unit as 'mNm' and as 'kNm'"):
+        read_log(tmp_path / "log.h5")
