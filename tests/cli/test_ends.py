@@ -19,6 +19,7 @@ import pytest
 import algid
 from algid.api.batch import answer
 from algid.api.design import answer as planned_answer
+from algid.api.identify import answer as identified
 from algid.api.options import stem_of
 from algid.base.errors import SettingError
 from algid.batches.jobs import Job, JobRecord, JobStatus
@@ -101,6 +102,12 @@ def test_a_design_that_leaves_a_parameter_open_ends_with_3(lacks: list[str], cod
     planned: Any = SimpleNamespace(open_parameters=lacks)
     told = planned_answer(planned, {"prior": "case1", "out": Path()})
     assert (told.exit, told.remarks) == (code, ["wrote case1.design"])
+
+
+def test_a_result_of_a_cut_log_ends_with_4(result: Path) -> None:
+    found, given = algid.read_result(result), {"verbose": False, "out": Path()}
+    lost = found.model_copy(update={"data_lost": True})
+    assert [identified(one, given).exit for one in (found, lost)] == [0, 4]
 
 
 def test_commands_say_where_their_files_are(
