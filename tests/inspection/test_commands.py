@@ -149,7 +149,9 @@ def test_a_new_profile_writes_all_that_can_be_set(kind: str, tmp_path: Path) -> 
     run("inspect", path, "--write-profile", written)
     with pytest.raises(OutputError, match="--force"):
         run("inspect", path, "--write-profile", written)
-    assert same(read_log(path, load_profile(written)), log)
+    profile = load_profile(written)
+    assert same(read_log(path, profile), log)
+    assert read_log(path).origin.mapping["tau2"].endswith(profile.tau2.source or "?")
     text = written.read_text()
     head, *tables = re.split(r"^\[", text, flags=re.MULTILINE)
     assert keys(Profile) - set(re.findall(r"^(?:# )?(\w+) = ", head, re.MULTILINE)) == set()
