@@ -21,7 +21,7 @@ LEVEL = BUDGET / 11
 from those of others, and leaves this as it is."""
 SHARES = {
     "BROKEN_BOUND": 1 / 11,
-    "NOT_WHITE": 2 / 11,  # of both joints
+    "whiteness": 2 / 11,  # of both joints; it warns of nothing, and has error bars wider
     "REFUTED": 1 / 11,
     "INSTRUMENTS": 1 / 11,
     "FEEDBACK": 1 / 11,

@@ -17,7 +17,8 @@ r       autocorrelation                                    (2, L)        1
 The error bars of the likelihood suppose innovations that are white and Gaussian: Ljung & Box's
 test on those of each joint, as they are and summed over 16 and 64 samples, so that slow colour is
 seen as well as fast. The smallest p-value counts three times over (Bonferroni), and a correlation
-too faint to matter counts as none. The excess kurtosis shows heavy tails.
+too faint to matter counts as none. Colour is no lack of the model: it decides what error bars rest
+on. Tails decide nothing, as least squares has the same covariance with any.
 """
 
 from __future__ import annotations
@@ -35,8 +36,6 @@ LAGS = 40
 SCALES = (1, 16, 64)
 _LAGS = 10
 _FAINT = 0.02  # root mean square of the correlations that does not matter
-_TAILS = 6.0  # standard errors of the kurtosis
-_HEAVY = 1.0  # excess kurtosis that matters
 ALIKE = 0.01  # relative difference of two periods that counts as none
 _BINS = 112
 _EDGES = np.geomspace(2.0**-14, 0.5, _BINS + 1)  # cycles a row
@@ -57,8 +56,8 @@ class ResidualSums:
     power : (s, bins), Σ P by bin
     lines, scatter : (bins,), lines in each bin, and their sum's variance for unit white noise
     products, pairs : (2, lags + 1) and (lags + 1,), Σ w_i w_(i+lag) and of how many pairs
-    counts, scaled, fourth : (3,), (3, 2, 1 + `_LAGS`) and (2,), rows summed over each of `SCALES`,
-        the products of those sums by lag, and Σ w⁴: see `judge`
+    counts, scaled : (3,) and (3, 2, 1 + `_LAGS`), rows summed over each of `SCALES`, and the
+        products of those sums by lag: see `judge`
     """
 
     dt: float
@@ -70,7 +69,6 @@ class ResidualSums:
     pairs: FloatArray
     counts: FloatArray
     scaled: FloatArray
-    fourth: FloatArray
 
     def __post_init__(self) -> None:
         keep_arrays(self)
@@ -115,7 +113,6 @@ def residual_sums(w: FloatArray, dt: float, stride: int = 1, lags: int = LAGS) -
         pairs,
         np.array(counts),
         np.array(scaled),
-        np.sum(w[:2] ** 4, axis=1),
     )
 
 
@@ -211,14 +208,10 @@ def whiteness_of(sums: ResidualSums) -> Spectra:
 
 @dataclass(frozen=True, eq=False)
 class Whiteness:
-    """The test's outcome by joint (2,): p-value, lag-one correlation, excess kurtosis.
-
-    And the verdict.
-    """
+    """The test's outcome by joint (2,): p-value, lag-one correlation, and the verdict."""
 
     p_value: FloatArray
     lag1: FloatArray
-    kurtosis: FloatArray
     joint_white: tuple[bool, bool]
 
     def __post_init__(self) -> None:
@@ -240,7 +233,7 @@ def judge(sums: ResidualSums) -> Whiteness:
     Returns
     -------
     Whiteness
-        A joint is white with a p-value of its share at least, and without heavy tails.
+        A joint is white with a p-value of its share at least.
 
     Notes
     -----
@@ -258,8 +251,5 @@ def judge(sums: ResidualSums) -> Whiteness:
     # In a long log the least colour is significant; one this faint does not move an error bar.
     faint = np.sqrt(np.mean(rho**2, axis=2)) < _FAINT
     p_value = np.minimum(1.0, len(SCALES) * np.where(faint, 1.0, p).min(axis=0))
-    variance = power[0, :, 0] / sums.counts[0]
-    kurtosis = sums.fourth / sums.counts[0] / variance**2 - 3
-    heavy = (kurtosis > _HEAVY) & (kurtosis > _TAILS * np.sqrt(24 / sums.counts[0]))
-    first, second = ((p_value >= 0.5 * level("NOT_WHITE")) & ~heavy).tolist()
-    return Whiteness(p_value, rho[0, :, 0], kurtosis, (first, second))
+    first, second = (p_value >= 0.5 * level("whiteness")).tolist()
+    return Whiteness(p_value, rho[0, :, 0], (first, second))

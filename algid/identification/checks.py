@@ -316,7 +316,7 @@ CHECKS = (
     Check("LOGS_APART", _of_arms),
 )
 """Checks of a finished fit, in order. What is checked while it is made has its share in
-`algid.base.significance` too, and a consequence of its own: another estimate (NOT_WHITE, REFUTED,
+`algid.base.significance` too, and a consequence of its own: another estimate (REFUTED,
 INSTRUMENTS), or no result (BROKEN_BOUND)."""
 
 

@@ -165,10 +165,7 @@ def _reasons(result: Result) -> Iterator[Notice]:
     yield from _broken_bounds(result)
     if fit is not None:
         least, found = LEAST_R2, fit.prediction
-        coloured = [visible(name) for name, test in fit.whiteness.items() if not test.white]
-        if fit.intervals == "likelihood" and coloured:
-            yield Notice("NOT_WHITE", numbers={"names": coloured})
-        elif fit.intervals == "likelihood":
+        if fit.intervals == "likelihood":
             least = 0.0  # what is left of a torque is its sensors' noise
         if found is not None:
             yield from (_explained(found, one) for one in (1, 2) if found.r2[one - 1] < least)

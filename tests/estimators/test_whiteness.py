@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import binom, chi2, kstest, kurtosis
+from scipy.stats import binom, chi2, kstest
 
 from algid.arm import FloatArray
 from algid.estimators.innovations import ResidualSums, judge, residual_sums
@@ -45,8 +45,6 @@ def test_the_p_value_is_that_of_the_least_likely_scale_three_times_over() -> Non
         assert found.p_value[joint] == pytest.approx(p, rel=1e-9)
         x = w[joint]
         assert found.lag1[joint] == pytest.approx((x[1:] @ x[:-1]) / (x @ x), rel=1e-12)
-        # about zero
-        assert found.kurtosis[joint] == pytest.approx(kurtosis(np.concatenate([x, -x])), rel=1e-9)
 
 
 def test_sums_of_pieces_are_added() -> None:
@@ -55,7 +53,6 @@ def test_sums_of_pieces_are_added() -> None:
         judge(summed(w)),
         judge(summed(w[:, :1600]) + summed(w[:, 1600:])),
     )
-    np.testing.assert_allclose(parts.kurtosis, whole.kurtosis, rtol=1e-12)
     np.testing.assert_allclose(parts.lag1, whole.lag1, atol=3 / 3000)  # one product in 3000 is lost
 
 
@@ -81,14 +78,10 @@ def test_white_innovations_pass_as_often_as_said_and_coloured_ones_do_not() -> N
     )
 
 
-def test_colour_that_is_too_faint_to_matter_and_tails() -> None:
+def test_colour_that_is_too_faint_to_matter_is_none() -> None:
     rng = np.random.default_rng(6)
     faint = np.stack(
         [np.convolve(row, [1.0, 0.03], "valid") for row in rng.standard_normal((2, 60_001))]
     )
     assert float(chi2.sf(60_000 * 0.03**2, 10)) < 1e-6  # Ljung and Box alone would call it coloured
     assert judge(summed(faint)).white
-    heavy = rng.standard_t(5, (2, 60_000))
-    assert judge(summed(heavy)).joint_white == (False, False)
-    light = rng.uniform(-1, 1, (2, 60_000))
-    assert judge(summed(light)).white

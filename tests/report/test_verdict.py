@@ -15,7 +15,6 @@ from algid.results import (
     Status,
     TorqueModel,
     TorquePrediction,
-    WhitenessTest,
 )
 from tests.report.folders import estimate
 
@@ -66,11 +65,6 @@ def noticed(result: Result, *notices: Notice) -> Result:
 def predicted(one: float, two: float, of_torque: float = 1.0, **more: object) -> dict[str, object]:
     found = TorquePrediction(rmse=(1, 1), nrmse=(of_torque, 1), r2=(one, two), filter="none")
     return {"residual": found.model_copy(update=more)}
-
-
-def coloured(result: Result, intervals: str = "likelihood") -> Result:
-    test = WhitenessTest(white=False, p_value=0.0, lag1_correlation=0.9)
-    return with_fit(result, whiteness={"tau1": test}, intervals=intervals)
 
 
 def implausible(result: Result, **changes: object) -> Result:
@@ -161,8 +155,6 @@ CASES = {
         "failed", ["UNKNOWN_CAUSE", "BROKEN_BOUND"], "break k3 >= 0 by 9",
     ),
     "bound": Case(lambda r: with_fit(r, **broken(4.0)), codes=["BROKEN_BOUND"]),
-    "coloured": Case(coloured, codes=["NOT_WHITE"]),
-    "coloured, allowed for": Case(lambda r: coloured(r, "sandwich"), "good"),
     "not converged": Case(lambda r: with_fit(r, converged=False), "failed", [], "not converge"),
     "R² of 91 %": Case(lambda r: with_fit(r, **predicted(0.91, 0.93)), "good"),
     "R² of 89 %": Case(
