@@ -107,13 +107,14 @@ def test_every_window_is_weighted_least_squares_with_students_test(
     assert found["drift"].any() == (growth / scatter > 0.001 and growth > 0)
 
 
-def test_estimates_without_an_error_bar_count_for_nothing(tmp_path: Path) -> None:
+def test_estimates_without_an_error_bar_or_from_a_prior_count_for_nothing(tmp_path: Path) -> None:
     good = [1.0, 1.1, 0.9, 1.05, 0.95, 1.02, 0.98, 1.01]
     jobs = table([*good, 50.0, math.nan, 50.0], [*[0.01] * 8, 0.0, 0.01, math.nan])
     nothing = jobs.with_columns(
         k1_std=pl.when(pl.col("job") == "j10").then(None).otherwise(pl.col("k1_std"))
     )
-    for one in (jobs.head(10), nothing):
+    prior = table([*good, 50.0], k1_status=["OK"] * 8 + ["FROM_PRIOR"])
+    for one in (jobs.head(10), nothing, prior):
         history = history_in(tmp_path, one)
         (points,) = named(overview(history).data, "log")
         assert np.isfinite(typed(points["y"])).sum() == 8
