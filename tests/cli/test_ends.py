@@ -122,6 +122,9 @@ def test_commands_say_where_their_files_are(
         assert (done.code, done.out) == (0, "")
         assert done.err.endswith(f"wrote {file}\n")
         assert Path(file).is_file()
+    draws = ("export", result, "--to", "csv", "--draws", "2")
+    ends = [call(*draws, *flags).code for flags in ((), (), ("--force",))]
+    assert ends == [0, 2, 0]  # a folder that is there stays, unless it is to be replaced
     done = call("compare", result, result, "-o", ".")
     assert (done.code, done.err) == (0, "wrote compare.html\n")
     assert Path("compare.html").is_file()
