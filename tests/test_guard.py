@@ -91,7 +91,7 @@ def command(words):
     return 0
 
 algid.guard.SILENCE = float(os.environ.get("SILENCE", "10"))
-algid.cli.app.called = command
+algid.cli.app.app.main = lambda words, *_, **__: command(words)
 algid.cli.main()
 """
 FORMAT = "; look at the file, or write it anew in another format\n"
