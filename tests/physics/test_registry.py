@@ -263,7 +263,7 @@ def add_toys(package: Path) -> None:
     (package / "readers" / "toy.py").write_text(READER)
     formats = package / "readers" / "formats.py"
     inserted(formats, '    FileFormat("rosbag2"', FORMAT)
-    inserted(formats, '        case "rosbag2" | "db3" | "bag":', OPENED)
+    inserted(formats, '        case "mcap" | "rosbag2" | "db3" | "bag":', OPENED)
     (package / "inspection" / "toy.py").write_text(CHECK)
     checks = package / "inspection" / "checks.py"
     inserted(checks, "        *rests(log, whole),\n", "        *toys(log),\n")
@@ -271,7 +271,7 @@ def add_toys(package: Path) -> None:
     inserted(
         package / "messages.toml",
         "[DATA_LOST]\n",
-        '[TOY_SEEN]\ncause = "A toy."\ntext = "{count:# toy|toys} seen"\n\n',
+        '[TOY_SEEN]\ncause = "A toy."\ntext = "{count:# toy|# toys} seen"\n\n',
     )
     (package / "estimators" / "toy.py").write_text(ESTIMATOR)
     methods = package / "methods.py"
