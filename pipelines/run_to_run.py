@@ -22,6 +22,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import combinations, product
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -138,7 +139,8 @@ def main() -> None:
     print("| build | contender | splits | " + " | ".join(FIGURES) + " | processor s | fell |")
     print("|" + (5 + len(FIGURES)) * "---|", flush=True)
     peers = [peer for peer in PEERS if peer not in SIMULATED_ALONE] if given.splits else ["algid"]
-    with ProcessPoolExecutor(2) as pool:
+    # polars, which reads the runs here, waits for ever in a process that is forked
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         for build, peer in product(BUILDS, peers):
             every = range(len(runs(given.data, build)))
             whole = list(splits(every))
