@@ -210,7 +210,8 @@ def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
                 found.parts.append(last)
         place, data_end = end, data_end or code == Opcode.DATA_END
     left = size - place
-    if data_end and (place < end or left <= len(MCAP)):
+    summary = code != Opcode.MESSAGE_INDEX and (place < end or left <= len(MCAP))
+    if data_end and summary:
         return  # what breaks off behind the data is its summary
     case = "chunk" if code == Opcode.CHUNK else "record" if left else "end"
     found.notices.append(Notice("CUT_OFF", numbers={"case": case, "first": place, "bytes": left}))
