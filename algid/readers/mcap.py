@@ -210,9 +210,10 @@ def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
                 found.parts.append(last)
         place, data_end = end, data_end or code == Opcode.DATA_END
     left = size - place
-    summary = code != Opcode.MESSAGE_INDEX and (place < end or left <= len(MCAP))
-    if data_end and summary:
-        return  # what breaks off behind the data is its summary
+    # what breaks off behind the data is its summary, but for a message index before its footer
+    summary = place < end and (code != Opcode.MESSAGE_INDEX or left <= _FOOTER_BYTES)
+    if data_end and (summary or left <= len(MCAP)):
+        return
     case = "chunk" if code == Opcode.CHUNK else "record" if left else "end"
     found.notices.append(Notice("CUT_OFF", numbers={"case": case, "first": place, "bytes": left}))
     found.damage.append(f"it breaks off at byte {place}")
