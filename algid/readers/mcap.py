@@ -194,10 +194,11 @@ def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
             end > size
             or not (0 < code <= Opcode.DATA_END or code >= 0x80)
             or (code == Opcode.MESSAGE and length < _MESSAGE_BYTES)
-            or (code == Opcode.MESSAGE_INDEX and (last.loose or not follows))  # its chunk is gone
+            # its chunk is gone; behind what ends the data it may be a damaged footer
+            or (code == Opcode.MESSAGE_INDEX and not data_end and (last.loose or not follows))
         ):
             break
-        if code == Opcode.MESSAGE_INDEX:
+        if code == Opcode.MESSAGE_INDEX and follows:
             last.length = end - last.start
             if length > _INDEX.size - _FRAME.size:
                 last.counts = {**(last.counts or {}), channel: length // 16}
@@ -210,10 +211,8 @@ def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
                 found.parts.append(last)
         place, data_end = end, data_end or code == Opcode.DATA_END
     left = size - place
-    # what breaks off behind the data is its summary, but for a message index before its footer
-    summary = place < end and (code != Opcode.MESSAGE_INDEX or left <= _FOOTER_BYTES)
-    if data_end and (summary or left <= len(MCAP)):
-        return
+    if data_end and (place < end or left <= len(MCAP)):
+        return  # what breaks off behind the data is its summary
     case = "chunk" if code == Opcode.CHUNK else "record" if left else "end"
     found.notices.append(Notice("CUT_OFF", numbers={"case": case, "first": place, "bytes": left}))
     found.damage.append(f"it breaks off at byte {place}")

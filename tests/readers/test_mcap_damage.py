@@ -183,19 +183,21 @@ def test_two_files_behind_one_another_are_not_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("tail", [b"", b"\x89MCAP0\r\n"])
-@pytest.mark.parametrize("chunked", [True, False])
+@pytest.mark.parametrize("before", ["message", "chunk", "index"])
 def test_an_end_of_the_data_that_stands_too_early_hides_no_loss(
-    chunked: bool, tail: bytes, tmp_path: Path
+    before: str, tail: bytes, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.mcap"
-    content = made(path, use_chunking=chunked)
+    content = made(path, use_chunking=before != "message")
     start = summary_of(content)
     end = content[start - 13 : start]
     assert end[0] == 15
     message = struct.pack("<BQ", 5, 22 + len(messages_of(LONG)[0][2]))
     first, place = content.find(message), content.rfind(message)
-    if chunked:
+    if before != "message":
         first, place = (chunks_of(path)[number].chunk_start_offset for number in (0, 3))
+    if before == "index":
+        first += chunks_of(path)[0].chunk_length
     # all of it, but for the summary
     whole = content[:first] + end + content[first:start] + tail
     assert len(beginning(path, whole)) == len(LONG)
