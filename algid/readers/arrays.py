@@ -110,7 +110,6 @@ def _of_hdf5(path: Path) -> Read:
         raise LogError(f"{path}: an HDF5 file, for which h5py is needed: {mend}") from error
     arrays: Arrays = {}
     attributes: dict[str, dict[str, str]] = {}
-
     of_groups: dict[str, dict[str, str]] = {}
 
     def take(name: str, one: Any) -> None:
@@ -118,7 +117,8 @@ def _of_hdf5(path: Path) -> Read:
             stated = {
                 key: text_of(value) for key, value in one.attrs.items() if "unit" in key.lower()
             }
-            of_groups[name] = {key: stated.pop(key) for key in ("unit", "units") if key in stated}
+            own = {key: stated.pop(key) for key in ("unit", "units") if key in stated}
+            of_groups[name] = of_groups.get(name.rpartition("/")[0], {}) | own
             for key, value in stated.items():
                 if metadata.setdefault(key, value) != value:
                     raise LogError(

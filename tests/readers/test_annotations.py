@@ -157,12 +157,14 @@ def test_attributes_that_pandas_saved_hold(
     assert read_log(tmp_path / "log").tau[:, 1] == pytest.approx([1e-3, 1e-3])
 
 
-@pytest.mark.parametrize("place", ["group", "quantity"])
+@pytest.mark.parametrize("place", ["group", "quantity", "group above"])
 def test_units_of_an_hdf5_group_are_those_of_its_datasets(place: str, tmp_path: Path) -> None:
     with h5py.File(tmp_path / "log.h5", "w") as file:
         group = file.create_group("log")
         torques = group if place == "group" else file.create_group("torque")
         torques.attrs["torque_unit" if place == "group" else "units"] = "mNm"
+        if place == "group above":
+            torques = torques.create_group("measured")
         for name in COLUMNS:
             (torques if name.startswith("tau") else group)[name] = np.arange(20.0)
     assert read_log(tmp_path / "log.h5").tau[:, 1] == pytest.approx([1e-3, 1e-3])
