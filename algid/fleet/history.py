@@ -43,16 +43,16 @@ def read_jobs(path: Path) -> pl.DataFrame:
         missing = [name for name in ("job", "robot", "status", "time") if name not in columns]
         if missing:
             raise ResultError(f"{path}: no column {', '.join(missing)}; {expected}")
-        nulls = {name: pl.lit(None) for name in NUMBERS if name not in columns}
+        changed = {name: pl.lit(None) for name in NUMBERS if name not in columns}
         for name in PARAMETERS:
             if {name, told := f"{name}_status"} <= {*columns}:
                 measured = pl.col(told).cast(pl.String).ne_missing("FROM_PRIOR")
-                nulls[name] = pl.when(measured).then(pl.col(name))
+                changed[name] = pl.when(measured).then(pl.col(name))
         # a manifest's labels may be words: then they are no numbers
         number, most = pl.col(NUMBERS).cast(pl.Float64, strict=False), LIMITS.largest_value
         age = pl.col("time") - pl.col("time").min().over("robot")
         t = age.dt.total_seconds() / (86400 * MONTH_DAYS)
-        jobs = jobs.with_columns(**nulls).select(
+        jobs = jobs.with_columns(**changed).select(
             pl.col("job", "robot", "status").cast(pl.String),
             "time",
             pl.when(number.abs().is_between(1 / most, most) | (number == 0)).then(number),
