@@ -318,14 +318,6 @@ def test_columns_in_memory_are_read_as_a_file_of_them(
     assert [notice.code for notice in found.notices] == [notice.code for notice in of_file.notices]
 
 
-def test_several_logs_in_memory_are_pooled_and_a_twin_counts_once(columns: dict[str, Any]) -> None:
-    frame = pl.DataFrame(columns)
-    halves = [frame[:1000], {name: column[1000:] for name, column in columns.items()}]
-    pooled = algid.identify([*halves, frame[:1000]], settings=WEAK)
-    assert [log.rows for log in pooled.logs] == [1000, 1001]
-    assert "SAME_LOG" in [notice.code for notice in pooled.notices]
-
-
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [

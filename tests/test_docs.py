@@ -17,7 +17,6 @@ import re
 import shutil
 import subprocess
 import sys
-import tomllib
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -25,7 +24,6 @@ from pathlib import Path
 import pytest
 
 import algid
-from algid.api.guide import TOPICS
 from pipelines.docs import pages
 from pipelines.typed import run
 
@@ -249,22 +247,6 @@ def test_a_link_that_leads_nowhere_is_seen(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text('# A `b` c!\n[x](#a-b-c) [y](#d) [z](other.md) <a href="page.md#e">\n')
     assert leading_nowhere(page) == ["#d", "other.md", "page.md#e"]
-
-
-def test_the_sites_configuration_names_what_is_there() -> None:
-    """The folders of the makefile, the theme and plugins of the extra ``docs``, every page."""
-    text = (ROOT / "pipelines/mkdocs.yml").read_text("utf-8")
-    made = (ROOT / "pipelines/docs.mk").read_text("utf-8")
-    said = dict(re.findall(r"^(\w+): ([^#\n]+?) *(?:#.*)?$", text, re.MULTILINE))
-    assert (said["docs_dir"], said["site_dir"]) == ("../build/docs-pages", "../build/docs")
-    assert "pipelines.docs build/docs-pages\n" in made
-    assert "mkdocs build --strict --quiet --config-file pipelines/mkdocs.yml" in made
-    extra = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    needed = " ".join(extra["optional-dependencies"]["docs"])
-    assert "mkdocs-material" in needed
-    assert "mkdocstrings[python]" in needed
-    listed = re.findall(r"^  - ([\w-]+)\.md$", text, re.MULTILINE)
-    assert listed == ["index", *TOPICS, "reference"]
 
 
 @pytest.mark.parametrize(

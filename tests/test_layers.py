@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import subprocess
 import sys
 from functools import cache
@@ -11,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import algid
-from tests.layers import PURE, Room, breaches, cycles, imported, parsed, room
+from tests.layers import PURE, Room, breaches, cycles, imported, room
 
 ROOT = Path(algid.__file__).parent
 TABLE: dict[str, Room] = {  # lower rooms first
@@ -226,14 +225,3 @@ def test_importing_algid_loads_nothing_heavy() -> None:
     code = f"import sys, algid, algid.cli.app; print([m for m in {heavy} if m in sys.modules])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
-
-
-def test_a_public_class_has_a_name_of_its_own() -> None:
-    found: dict[str, list[str]] = {}
-    for path in sorted(ROOT.rglob("*.py")):
-        for node in ast.walk(parsed(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                if any(isinstance(b, ast.Attribute) and b.attr == node.name for b in node.bases):
-                    continue  # it adds to the class of its name
-                found.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
-    assert {name: places for name, places in found.items() if len(places) > 1} == {}

@@ -6,28 +6,10 @@ import numpy as np
 import pytest
 
 from algid.base.names import (
-    by_name,
     evenly_spread,
-    names_in,
-    outside,
-    places_outside,
     vector,
-    within,
 )
-from algid.model import K1, K2, K3, PARAMETERS
-
-
-def test_what_is_chosen_keeps_its_order() -> None:
-    names = (K3, K1, K2)
-    assert within(names, {K2, K3}) == (K3, K2)
-    assert outside(names, {K2, K3}) == (K1,)
-    assert places_outside(names, {K1}) == [0, 2]
-
-
-def test_names_of_parameters_find_them_again() -> None:
-    chosen = [PARAMETERS[K2], PARAMETERS[K1]]
-    assert names_in(chosen) == (K2, K1)
-    assert list(by_name(chosen).items()) == [(K2, PARAMETERS[K2]), (K1, PARAMETERS[K1])]
+from algid.model import K1, K2, K3
 
 
 def test_a_vector_has_the_order_of_the_names_and_says_what_is_missing() -> None:

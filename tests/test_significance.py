@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import ast
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.stats import norm
 
-import algid
 from algid.base.significance import (
     BUDGET,
     CERTAIN,
@@ -43,26 +38,3 @@ def test_a_log_without_fault_keeps_to_the_budget() -> None:
     largest = np.abs(draw.standard_normal((20_000, count, 12))).max(axis=2)
     warned = np.any(largest > sigmas(comparisons=12), axis=1)
     assert 0.7 * BUDGET < warned.mean() < 1.2 * BUDGET  # ± 2.6 standard errors
-
-
-NAMES = re.compile(r"_?(\w*GAP\w*|HOLE|AT_REST|\w*STILL|UNDETERMINED|NORMAL|ALPHA|P_VALUE)")
-QUANTILES = (1.645, 1.64, 1.96, 1.959964, 2.576, 2.58)
-
-
-def test_criteria_stand_once() -> None:
-    """No other module gives such a constant a number, or spells a quantile."""
-    spelled: list[tuple[str, str]] = []
-    for path in sorted(Path(algid.__file__).parent.rglob("*.py")):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        if path.name in ("criteria.py", "significance.py"):
-            continue
-        spelled += [
-            (path.name, str(node.value))
-            for node in ast.walk(tree)
-            if isinstance(node, ast.Constant) and node.value in QUANTILES
-        ]
-        for node in tree.body:
-            if isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant):
-                names = [one.id for one in node.targets if isinstance(one, ast.Name)]
-                spelled += [(path.name, name) for name in names if NAMES.fullmatch(name)]
-    assert spelled == []

@@ -88,11 +88,6 @@ def test_a_plot_is_the_pages_figure_of_every_interval(weighed: algid.Result) -> 
 def test_what_is_written_is_what_the_command_writes(
     logs: tuple[algid.Log, algid.Log], weighed: algid.Result, tmp_path: Path
 ) -> None:
-    page = tmp_path / "compare.html"
-    algid.compare([weighed, weighed], labels=["a", "b"], out=tmp_path)
-    assert page.is_file()
-    with pytest.raises(algid.AlgidError, match=r"compare\.html"):
-        algid.compare([weighed, weighed], out=tmp_path)
     made = algid.export(weighed, "c", l1=0.2, out=tmp_path / "arm.c")
     assert (tmp_path / "arm.c").read_text(encoding="utf-8") == made.text
     algid.track(logs[1], weighed, out=tmp_path)

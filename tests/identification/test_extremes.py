@@ -1,5 +1,5 @@
-"""Logs that are too short or too slow for an estimator, and values that no arm has: one line that
-says so.
+"""Logs that are too short or too slow for an estimator or lack what it needs, and values that no
+arm has: one line that says so.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.base.errors import LogError
+from algid.base.errors import AlgidError, LogError
 from algid.estimators.convention_search import judge
 from algid.identification.identify import identify
 from algid.log import Log, Origin
@@ -47,6 +47,33 @@ def test_a_log_too_short_for_the_likelihood_is_refused_with_what_it_takes(
 def test_a_loaded_log_too_short_for_the_likelihood_is_refused() -> None:
     with pytest.raises(LogError, match="no loaded log is long enough for the likelihood"):
         identify(log_of(*moving(100, 10)), log_of(*moving(10, 5)), report=False)
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        (
+            {"estimator": "paper", "observer": "zero-phase"},
+            (
+                "--set observer zero-phase: the paper's method observes as the paper does; leave "
+                "it out, say --set velocity=measured, or use --estimator refined or weak"
+            ),
+        ),
+        (
+            {"estimator": "weak", "velocity": "measured"},
+            (
+                "log: expected velocities omega1, omega2 for --set velocity=measured, found none; "
+                "they are observed by --set velocity=observer"
+            ),
+        ),
+    ],
+)
+def test_velocities_that_an_estimator_cannot_have_are_refused(
+    settings: dict[str, str], said: str
+) -> None:
+    with pytest.raises(AlgidError) as refused:
+        identify(log_of(*moving(100, 10)), settings=Settings().but(**settings), report=False)
+    assert str(refused.value) == said
 
 
 @pytest.mark.parametrize("spike", [1e6, 1e29])

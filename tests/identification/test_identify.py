@@ -103,12 +103,6 @@ def test_real_arm_is_identified(shared_data: Path) -> None:
     assert np.all(np.array(result.fit.residual.rmse) < (0.159, 0.114))
 
 
-def test_a_joint_that_stands_still_is_a_status(wide: tuple[Log, Log], tmp_path: Path) -> None:
-    log = wide[0].part(0, 1500)
-    still = replace(log, theta=np.stack([log.theta[0], np.zeros(len(log))]))
-    assert not identify(still, None, PAPER, out=tmp_path).complete
-
-
 @pytest.mark.parametrize(
     "runs",
     [

@@ -10,8 +10,6 @@ import algid
 from algid.base.errors import ResultError
 from algid.identification.identify import identify
 from algid.identification.known import (
-    by_constants,
-    contradictions,
     model_of,
     prior_of,
     shift_of,
@@ -103,18 +101,3 @@ def test_a_constant_that_is_needed_and_open_is_named(
         torque_constants(result, model_of(result), role, "r.json")  # type: ignore[arg-type]
     if role == "loaded":
         assert torque_constants(result, model_of(result), "unloaded", "r.json").size == 9
-
-
-def test_lengths_that_far_off_contradict_the_result(weighed: Result) -> None:
-    own = weighed.payload["l2"]
-    (l1, s1, _), (l2, s2) = by_constants(weighed), (own.estimate, own.std)
-    assert contradictions(weighed, {"l1": l1 + 4.89 * s1, "l2": l2 - 4.89 * s2}) == ()
-    first, second = contradictions(weighed, {"l1": l1 + 5.6 * s1, "l2": l2 - 7.2 * s2})
-    assert (
-        first.text == f"l1 is given as {l1 + 5.6 * s1:g} m, but identified as {l1:.5g} ± "
-        f"{weighed.quantile * s1:.2g} m (6 σ apart)"
-    )
-    assert (second.numbers["name"], second.numbers["distance"]) == ("l2", pytest.approx(7.2))
-    bare = weighed.model_copy(update={"payload": {}})
-    assert contradictions(bare, {"l2": 9.0}) == ()  # the constants tell l1 alone
-    assert len(contradictions(bare, {"l1": 9.0})) == 1

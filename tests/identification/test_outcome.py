@@ -17,21 +17,18 @@ from algid.estimators.combine import LogInformation
 from algid.estimators.fit import Fit
 from algid.estimators.prediction import PredictionScore
 from algid.estimators.terms import Selection
-from algid.identification import checks
 from algid.identification.by_likelihood import Fitted
-from algid.identification.checks import Check, doubted, fit_notes, remarks
+from algid.identification.checks import remarks
 from algid.identification.outcome import (
     estimate,
     outcome_of,
     table_rows,
-    unknown,
 )
 from algid.identification.recordings import Recordings, open_source
 from algid.identification.validate import prediction
 from algid.log import Log, Origin
-from algid.model import RIGID
 from algid.notices import Notice
-from algid.results import Estimate, FitSummary, Repeatability, Status
+from algid.results import FitSummary, Status
 from algid.settings import Settings
 from algid.table4 import LOADED_ROWS, UNLOADED_ROWS
 from tests.identification.fits import CASE, QUANTILE, K, fit_of, information, with_stds, with_values
@@ -60,16 +57,6 @@ def summed(fit: Fit, chosen: Selection | None = None, **settings: Any) -> FitSum
     chosen = chosen or Selection(fit.shared.model, False)
     recordings = survey(loaded=fit.shared.payload)
     return outcome_of(Fitted(fit, recordings, Settings(**settings), chosen)).fit
-
-
-def test_an_estimate_has_its_interval_and_one_that_is_open_has_nothing_but_its_unit() -> None:
-    found = estimate(2.0, 0.5, 1.25, "kg", "OK")
-    assert found == Estimate(estimate=2.0, std=0.5, ci95=(0.75, 3.25), unit="kg", status=Status.OK)
-    assert estimate(2.0, 0.5, 1.25, "kg", "NOT_CONVERGED").status is Status.NOT_CONVERGED
-    lost = estimate(2.0, 0.5, 1.25, "kg", "NOT_IDENTIFIABLE")
-    assert lost == unknown("kg")
-    assert (lost.estimate, lost.std, lost.ci95, lost.unit) == (None, None, (None, None), "kg")
-    assert estimate(np.nan, 1.0, 1.0, "kg", "OK").estimate is None
 
 
 def test_parameters_are_within_the_fits_quantile_of_their_deviations() -> None:
@@ -232,32 +219,6 @@ def test_a_length_that_the_constants_contradict_is_named() -> None:
     assert one.numbers["p_value"] == pytest.approx(2 * norm.sf(1.01 * ACCUSED))
 
 
-def notes(**changes: Any) -> list[Notice]:
-    summary = FitSummary(
-        noise={}, covariance_names=[], covariance=[], iterations=0, converged=True,
-        **({"intervals": "likelihood"} | changes),
-    )  # fmt: skip
-    return list(fit_notes(summary))
-
-
-def test_repeatability_and_gain_are_told_in_numbers() -> None:
-    repeated = Repeatability(masses=[0.5, 0.51234], std=0.0087, ci95=(0.0039, 0.28))
-    (one,) = notes(repeatability=repeated)
-    assert (
-        one.text
-        == "the loaded runs by themselves weigh 0.5, 0.5123 kg: repeatability 0.0087 kg (95 %: "
-        "0.0039 to 0.28)"
-    )
-    gain = Estimate(estimate=1.25, std=0.01, ci95=(1.23, 1.27), unit="1")
-    (one,) = notes(torque_gain=gain)
-    assert (one.key, one.note) == ("TORQUE_GAIN:off", False)
-    assert "the known payload says to multiply by 1.25 (95 %: 1.23 to 1.27), and" in one.text
-    (one,) = notes(torque_gain=Estimate(estimate=1.02, std=0.01, ci95=(1.0, 1.04), unit="1"))
-    assert (one.key, one.note) == ("TORQUE_GAIN:known", True)
-    (one,) = notes(torque_gain=unknown("1"))
-    assert one.code == "TORQUE_GAIN"
-
-
 def test_cross_validation_that_could_not_be_done_is_told() -> None:
     outcome = outcome_of(Fitted(fit_of(), survey(), Settings(cross_validate=True)))
     assert [one.code for one in outcome.notices] == ["SHORT_LOG"]
@@ -285,19 +246,6 @@ def test_that_what_is_only_rounding_is_zero_and_can_be_read_back() -> None:
     assert found.ci95 == (-0.2, 0.2)
     assert estimate(2e-30, 1e-31, 0.2, "N m", "OK").estimate == 2e-30
     assert estimate(2e-30, 1e-31, 0.2, "N m", "OK").std == 0.0
-
-
-def test_a_check_that_doubts_takes_the_error_bars_of_the_rigid_arm_alone(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    seen = Notice("HARDLY_DRIVEN", numbers={"case": "passive", "joint": 2})
-    table = (Check("HARDLY_DRIVEN", lambda _: iter([seen]), "doubt"),)
-    monkeypatch.setattr(checks, "CHECKS", table)
-    fit = doubted(Fitted(fit_of())).fit
-    marked = dict(zip(fit.names, fit.status, strict=True))
-    assert {name for name, word in marked.items() if word == "WEAK_EXCITATION"} == set(RIGID[:5])
-    assert fit.notes == (seen,)
-    assert not list(remarks(Fitted(fit_of())))  # it is said once, among the fit's notes
 
 
 def test_a_length_that_contradicts_the_logs_fails_their_payload_and_leads_its_reasons() -> None:

@@ -11,7 +11,6 @@ import pytest
 
 import algid
 from algid.base.errors import AlgidError
-from algid.estimators.fit import Fit
 from algid.identification.prior import Statement, drawn_covariance, with_prior
 from algid.model import RIGID
 from algid.results import Status
@@ -30,12 +29,6 @@ def cad(tmp_path: Path) -> Path:
     file = tmp_path / "arm.urdf"
     file.write_text(urdf(ARM))
     return file
-
-
-def said(fit: Fit, share: float, off: float = 0.0) -> Statement:
-    """Says of each constant that it errs by a `share`, and is wrong by `off` of that."""
-    k = fit.values[: len(RIGID)]
-    return Statement("arm.urdf", RIGID, k * (1 + off * share), np.diag((share * k) ** 2))
 
 
 def test_a_drawing_errs_as_draws_of_its_numbers_do() -> None:
@@ -71,21 +64,6 @@ def test_both_are_weighed_by_their_information() -> None:
     assert both.status == fit.status
     others = np.delete(np.arange(len(fit.names)), place)
     np.testing.assert_array_equal(both.values[others], fit.values[others])
-
-
-@pytest.mark.parametrize(("share", "own"), [(1e-9, True), (0.2, False)])
-def test_what_the_prior_knows_better_is_its_own(share: float, own: bool) -> None:
-    fit = fit_of(payload=False)
-    both = with_prior(fit, said(fit, share))
-    assert (set(both.status[: len(RIGID)]) == {"FROM_PRIOR"}) is own
-    assert "FROM_PRIOR" not in both.status[len(RIGID) :]
-
-
-def test_an_arm_at_rest_tells_its_weight_and_no_inertia() -> None:
-    """However sure noise makes a fit of it."""
-    fit = replace(fit_of(payload=False), moved=np.full(2, 5e-3))
-    both = with_prior(fit, said(fit, 0.2))
-    assert both.status == ("FROM_PRIOR", "OK", "FROM_PRIOR", "OK", "FROM_PRIOR", "OK", "OK")
 
 
 @pytest.mark.parametrize("estimator", ["refined", "weak"])

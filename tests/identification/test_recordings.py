@@ -67,35 +67,6 @@ def test_a_log_of_the_other_role_is_refused_and_one_of_its_own_is_not(
     open_source(moving(), role)  # type: ignore[arg-type]
 
 
-def test_a_log_whose_payload_changes_is_only_for_tracking() -> None:
-    truth = Truth(ARM, 0.0, None, ((1.0, 0.2),))
-    log = replace(moving(), origin=replace(moving().origin, truth=truth))
-    for role in ("unloaded", "loaded"):
-        with pytest.raises(
-            LogError,
-            match=r"^log\.csv: its metadata say that the payload changes; weigh it with algid",
-        ):
-            open_source(log, role)
-    assert open_source(log, "loaded", changing=True).role == "loaded"
-
-
-def test_a_summary_holds_what_the_whole_log_showed() -> None:
-    log = in_blocks(moving(samples=601), [100, 100, 350])
-    survey = Recordings([log])
-    summary = survey.summary(log)
-    assert (summary.path, summary.role, summary.format, summary.rows) == (
-        "log.csv",
-        "unloaded",
-        "csv",
-        601,
-    )
-    assert summary.start_ns == 5_000_000_000
-    assert summary.duration == pytest.approx(0.6, rel=1e-12)
-    assert summary.rate == pytest.approx(1000, rel=1e-12)
-    seen = survey.whole(log)
-    assert (seen.rows, seen.first_ns, seen.last_ns) == (601, 5_000_000_000, 5_600_000_000)
-
-
 def test_hashes_are_those_of_the_bytes(tmp_path: Path) -> None:
     log = moving()
     write_log(tmp_path / "log.csv", log)

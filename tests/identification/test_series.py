@@ -5,7 +5,6 @@ hand.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,7 +25,6 @@ from algid.identification.series import (
     information_blocks,
     scored_blocks,
     torque_blocks,
-    write_columns,
     write_fit_series,
 )
 from algid.log import Log, Origin
@@ -58,28 +56,6 @@ def moved(
 @pytest.fixture(scope="module")
 def both() -> tuple[tuple[Log, FloatArray], tuple[Log, FloatArray]]:
     return moved(K, 3), moved(LOADED_K, 4, start_ns=90_000_000_000)
-
-
-def test_blocks_become_one_file_with_the_first_stamps_beside_them(tmp_path: Path) -> None:
-    def blocks() -> Iterator[dict[str, object]]:
-        yield {
-            "log": np.array([0, 0], dtype=np.int32),
-            "t": np.array([0.0, 0.5]),
-            "kind": ["a", "b"],
-        }
-        yield {"log": np.array([1], dtype=np.int32), "t": np.array([np.nan]), "kind": ["c"]}
-
-    write_columns(tmp_path / "some.parquet", blocks(), [5, 1_700_000_000_123_456_789])
-    table = pq.read_table(tmp_path / "some.parquet")
-    assert table["log"].to_pylist() == [0, 0, 1]
-    assert table["t"].to_pylist()[:2] == [0.0, 0.5]
-    assert np.isnan(table["t"].to_pylist()[2])
-    assert table["kind"].to_pylist() == ["a", "b", "c"]
-    assert json.loads(table.schema.metadata[START_KEY]) == [5, 1_700_000_000_123_456_789]
-    assert (
-        pq.ParquetFile(tmp_path / "some.parquet").metadata.row_group(0).column(1).compression
-        == "ZSTD"
-    )
 
 
 def test_the_predicted_torque_is_that_of_the_equation_of_motion(
@@ -185,12 +161,3 @@ def test_the_torque_in_the_file_is_the_one_that_is_scored(
     np.testing.assert_allclose(
         block["tau1"], np.interp(block["t"], t, slow[0]), atol=0.01 * np.abs(tau).max()
     )
-
-
-def test_a_fit_held_within_bounds_or_of_fewer_logs_lacks_what_it_cannot_tell(
-    both: tuple[tuple[Log, FloatArray], tuple[Log, FloatArray]], tmp_path: Path
-) -> None:
-    survey = Recordings([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
-    fit = fit_of()
-    write_fit_series(tmp_path, Fitted(replace(fit, logs=fit.logs[:1]), survey), None)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["scored.parquet", "torque.parquet"]

@@ -89,11 +89,9 @@ def test_logs_that_fit_in_memory_are_read_once(
     passes = [list(survey.segments(counting)) for _ in range(3)]
     assert len(begun) == readings
     for again in passes[1:]:
-        assert [piece.start for piece in again] == [piece.start for piece in passes[0]]
-        assert all(
-            np.array_equal(one.theta, other.theta)
-            for one, other in zip(again, passes[0], strict=True)
-        )
+        for one, other in zip(again, passes[0], strict=True):
+            assert one.start == other.start
+            np.testing.assert_array_equal(one.theta, other.theta)
 
 
 def test_a_pass_that_ends_early_is_not_taken_for_the_whole_log(uneven: Log) -> None:

@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from algid.arm import FloatArray, forward_dynamics, inverse_dynamics, with_payload
+from algid.arm import FloatArray, forward_dynamics, inverse_dynamics
 from algid.identification.identify import identify
 from algid.identification.recordings import Recordings, Role, open_source
 from algid.identification.series import Predictor
-from algid.identification.validate import predictor_of, validate
+from algid.identification.validate import validate
 from algid.log import Log, Origin
 from algid.model import Model
-from algid.results import Result
 from algid.settings import Settings
 from algid.signals.shift import TorqueShift
 from algid.synth.cases import load_case
@@ -27,15 +26,14 @@ from algid.synth.simulator import simulate as move
 
 CASE = load_case("case1")
 K = CASE.arm.constants()
-LOADED_K = with_payload(K, CASE.arm.payload_constants(CASE.payload))
 DT = 4e-3
 SIGMA = 0.02  # N m
 EDGE = round(0.3 / DT)  # that the score leaves out
 
 
 @cache
-def moved(seed: int, *, loaded: bool = False) -> SimulatedMotion:
-    return move(LOADED_K if loaded else K, wide_multi_sine(CASE.arm, seed), DT * np.arange(1001))
+def moved(seed: int) -> SimulatedMotion:
+    return move(K, wide_multi_sine(CASE.arm, seed), DT * np.arange(1001))
 
 
 def logged(motion: SimulatedMotion, seed: int, *, lead: int = 0) -> Log:
@@ -128,25 +126,3 @@ def test_cross_validation_is_the_prediction_of_each_log_by_a_fit_of_the_others(
         squares, count = squares + np.sum(left**2, axis=1), count + left.shape[1]
     np.testing.assert_allclose(result.fit.cross_validation.rmse, np.sqrt(squares / count), rtol=0.1)
     assert np.all(np.array(result.fit.cross_validation.rmse) > np.array(result.fit.residual.rmse))
-
-
-@pytest.fixture(scope="module")
-def weighed(motions: list[SimulatedMotion]) -> Result:
-    settings = Settings(estimator="weak", model="plain")
-    return identify(logged(motions[0], 1), logged(moved(4, loaded=True), 2), settings, report=False)
-
-
-def test_a_result_predicts_logs_of_both_roles(
-    weighed: Result, motions: list[SimulatedMotion]
-) -> None:
-    fresh = survey(
-        (logged(motions[1], 11), "unloaded"), (logged(moved(8, loaded=True), 12), "loaded")
-    )
-    found = validate(predictor_of(weighed, "r"), fresh)
-    for name in ("log11", "log12"):
-        one = found.logs[name]
-        # little beyond the torque's own noise below 5 Hz, σ √(2 · 5 Hz · dt) and the filter's slope
-        assert np.all(np.array(one.rmse) < 1.5 * SIGMA * np.sqrt(2 * 5.0 * DT))
-    swapped = survey((logged(motions[1], 11), "loaded"))
-    bad = validate(predictor_of(weighed, "r"), swapped).total
-    assert bad.rmse[0] > 3 * SIGMA
