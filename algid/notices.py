@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 import shlex
-import string
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,7 +18,7 @@ from importlib import resources
 from itertools import groupby
 from typing import Any, Literal
 
-from algid.base.text import as_toml, joined
+from algid.base.text import as_toml, filled, joined
 from algid.options import FLAGS, SET, VALUES, flag
 
 
@@ -62,22 +61,6 @@ class Remedy:
     def __str__(self) -> str:
         """As messages name it."""
         return f"{self.when}: {self.words}" if self.when else self.words
-
-
-class _Words(string.Formatter):
-    """Format strings: of ``{count:# sample has|# samples have}`` one is taken, lists are joined."""
-
-    def format_field(self, value: Any, spec: str) -> str:
-        """One value as `spec` has it; behind ``~``, # is the value, empty for 0, None or empty."""
-        several, optional, form = isinstance(value, list | tuple), spec[:1] == "~", spec.lstrip("~")
-        if optional and not value:
-            return ""
-        if "|" in form:
-            count = len(value) if several else value
-            return form.split("|")[count != 1].replace("#", f"{count:,}")
-        if optional:
-            return form.replace("#", str(value))
-        return joined(list(map(str, value))) if several else str(format(value, form))
 
 
 @cache
@@ -157,7 +140,7 @@ class Notice:
             form = (
                 entry["text"] if isinstance(entry["text"], str) else entry["text"][values["case"]]
             )
-            made: dict[str, Any] = {"text": _Words().vformat(form + _ANYWHERE, (), values)}
+            made: dict[str, Any] = {"text": filled(form + _ANYWHERE, **values)}
         except (LookupError, TypeError, ValueError) as error:
             raise ValueError(
                 f"code {self.code!r:.60}: it has no text for the numbers {sorted(self.numbers)}"

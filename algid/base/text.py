@@ -112,26 +112,41 @@ LARGEST_FIXED = 1e6
 MOST_DIGITS = 8
 
 
-class _Cells(string.Formatter):
-    """Python's formats, and ``{:~3}`` for three significant digits; True is yes.
-
-    None and NaN are a dash.
-    """
+class _Form(string.Formatter):
+    """Python's formats, and what `filled` says of them."""
 
     def format_field(self, value: Any, spec: str) -> str:
         """One value as `spec` has it."""
+        several, optional, form = isinstance(value, list | tuple), spec[:1] == "~", spec.lstrip("~")
+        if optional and form.isdigit():
+            return significant(value, int(form))
+        if optional and not value:
+            return ""
+        if "|" in form:
+            count = len(value) if several else value
+            return form.split("|")[count != 1].replace("#", f"{count:,}")
+        if optional:
+            return form.replace("#", str(value))
         if value is None or value != value:
             return ABSENT
         if isinstance(value, bool):
             return "yes" if value else "no"
-        if spec.startswith("~"):
-            return significant(value, int(spec[1:]))
-        return str(format(value, spec))
+        return joined(list(map(str, value))) if several else str(format(value, form))
+
+
+def filled(form: str, *values: Any, **named: Any) -> str:
+    """A form such as `str.format` takes, filled in.
+
+    ``{:~3}`` has three significant digits. Of ``{count:# sample has|# samples have}`` one is taken.
+    Behind ``~``, # is the value; nothing stands there for 0, None or empty. Lists are joined. True
+    is yes; None and NaN are a dash.
+    """
+    return _Form().vformat(form, values, named)
 
 
 def cells(form: str, *values: Any, **named: Any) -> tuple[str, ...]:
     """A row of a table: each cell as its part of `form` has it, with " | " between the parts."""
-    return tuple(_Cells().vformat(part, values, named) for part in form.split(" | "))
+    return tuple(filled(part, *values, **named) for part in form.split(" | "))
 
 
 def significant(value: float | None, digits: int = 5) -> str:
