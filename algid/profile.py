@@ -15,7 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr,
 from algid.base.errors import SettingError
 from algid.base.files import misfit, read_toml
 from algid.base.limits import PHYSICAL, PRIOR_ERROR, within
-from algid.base.units import Quantity, names_of, unit_of
+from algid.base.units import names_of, unit_of
 from algid.options import Option, flag
 
 
@@ -24,7 +24,7 @@ def _usual(unit: object) -> object:
     return (unit_of(unit) or unit) if isinstance(unit, str) else unit
 
 
-def _unit(*quantities: Quantity) -> Any:
+def _unit(*quantities: str) -> Any:
     """One of the units of these quantities, by any of its names."""
     return Annotated[Literal[names_of(*quantities)], BeforeValidator(_usual)]
 
@@ -34,11 +34,14 @@ if TYPE_CHECKING:  # a type checker cannot read a registry
     VelocityUnit = str
     TorqueUnit = str
     TimeUnit = str
+    Pair = tuple[str, str]
 else:
     AngleUnit = _unit("angle")
     VelocityUnit = _unit("velocity")
     TorqueUnit = _unit("torque", "current")
     TimeUnit = _unit("time")
+    Name = Annotated[str, Field(min_length=1)]
+    Pair = Annotated[tuple[Name, ...], Field(min_length=2, max_length=2)]
 Effort = Literal[
     "raw", "gravity-compensated", "friction-compensated", "external", "command", "current"
 ]
@@ -75,15 +78,6 @@ OF_ONE_LOG = ("torque_file", "segment", "start", "end")
 def parts_of(given: Any) -> Any:
     """The parts of ``one,two``, or what comes in parts already."""
     return [part.strip() for part in given.split(",")] if isinstance(given, str) else given
-
-
-def _two_names(given: object) -> object:
-    """Two names, out of ``NAME,NAME`` too."""
-    parts = parts_of(given)
-    pair = isinstance(parts, list | tuple) and len(parts) == 2 and all(parts)
-    if given is not None and not pair:
-        raise ValueError("expected two names like shoulder,elbow")
-    return parts
 
 
 def _plain(path: object) -> object:
@@ -229,7 +223,7 @@ class Profile(_Strict):
     topic: str | None = None
     angle_unit: AngleUnit | None = None
     torque_unit: TorqueUnit | None = None
-    joints: Annotated[tuple[str, str] | None, BeforeValidator(_two_names)] = None
+    joints: Annotated[Pair | None, BeforeValidator(parts_of)] = None
     clock: Literal["header", "log"] | None = None
     time: str | None = None
     time_unit: TimeUnit | None = None

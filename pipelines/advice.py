@@ -158,7 +158,7 @@ def advices(words: list[str], outcome: Outcome) -> dict[str, list[str]]:
         found["run first"] = shlex.split(verdict.command)
     for reason in verdict.reasons:
         for remedy in reason.remedies if reason.code in CAUSES else ():
-            command = shlex.split(again(outcome.result, remedy))
+            command = shlex.split(str(again(outcome.result, remedy)))
             if remedy.complete and command not in found.values():
                 found[f"{reason.code}: {' '.join(remedy.flags)}"] = command
     return found

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 import algid
-from algid.api.synth import EXAMPLE, FRICTION, LOGS, PROFILE
+from algid.api.synth import EXAMPLE, FRICTION, LOGS
 from algid.arm import CONSTANT_NAMES
 from algid.base.errors import OutputError
 from algid.inspection.checks import inspect_log
-from algid.profile import load_profile
+from algid.profile import Profile
 from algid.synth.cases import load_case
 from tests.processes import Outcome
 
@@ -21,9 +21,7 @@ def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("example")
     done = Outcome("synth", "example", "-o", folder)
     assert (done.code, done.err) == (0, "")
-    assert done.out.split() == [str(folder / f"{name}.csv") for name in LOGS] + [
-        str(folder / PROFILE)
-    ]
+    assert done.out.split() == [str(folder / f"{name}.csv") for name in LOGS]
     return folder
 
 
@@ -40,7 +38,7 @@ def test_nothing_is_overwritten_unless_forced(example: Path, tmp_path: Path) -> 
 def test_a_log_does_not_say_how_its_zero_lies_and_physics_does(example: Path) -> None:
     found = {one.code for one in inspect_log(example / "run1.csv").findings}
     assert "WRONG_CONVENTION" in found
-    profile = load_profile(example / PROFILE)
+    profile = Profile(zero="hanging")
     assert "WRONG_CONVENTION" not in {
         one.code for one in inspect_log(example / "run1.csv", profile).findings
     }
@@ -48,8 +46,7 @@ def test_a_log_does_not_say_how_its_zero_lies_and_physics_does(example: Path) ->
 
 def test_with_its_profile_the_arm_is_found(example: Path) -> None:
     """Within four standard deviations, and these a thousandth of the value."""
-    profile = load_profile(example / PROFILE)
-    result = algid.identify(example / "run1.csv", example / "loaded.csv", profile=profile)
+    result = algid.identify(example / "run1.csv", example / "loaded.csv", zero="hanging")
     case = load_case(str(EXAMPLE))
     truth = dict(zip(CONSTANT_NAMES, case.arm.constants(), strict=True))
     truth |= {"f1": FRICTION[0], "f2": FRICTION[1], "m_p": case.payload, "l1": case.arm.l1}

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from datetime import UTC, date, datetime
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, Field
 
 from algid.api import Answer
 from algid.api.options import CASES, Folder, Seed, options_of, verb
 from algid.base.errors import SettingError
-from algid.base.files import refuse_existing, whole_file
+from algid.base.files import refuse_existing
 from algid.base.limits import PHYSICAL, within
 from algid.log import Log
 from algid.options import Option, flag
@@ -32,16 +32,14 @@ if TYPE_CHECKING:
     from algid.base.progress import Progress
     from algid.synth.cases import Case
 
-FIRST_YEAR, LAST_YEAR = 1970, 2037
+FIRST, END = datetime(1970, 1, 1, tzinfo=UTC), datetime(2038, 1, 1, tzinfo=UTC)
 """Of a log's start: the stamps in messages of ROS 2 end in January 2038."""
 
 
-def _moment(given: object) -> int:
-    """Ns from 1970 to a date, in UTC where it names no zone."""
+def _moment(given: object) -> datetime:
+    """A moment, in UTC where it names no zone."""
     start = datetime.fromisoformat(str(given))
-    if not FIRST_YEAR <= start.year <= LAST_YEAR:
-        raise ValueError(f"expected a date from {FIRST_YEAR} to {LAST_YEAR}")
-    return int(start.replace(tzinfo=start.tzinfo or UTC).timestamp()) * 10**9
+    return start.replace(tzinfo=start.tzinfo or UTC)
 
 
 def _pairs(given: Any) -> Any:
@@ -51,17 +49,19 @@ def _pairs(given: Any) -> Any:
 
 _Angle = Annotated[float, within(PHYSICAL.angle)]
 _Speed = Annotated[float, within(PHYSICAL.speed)]
-_Time = Annotated[float, within((0, PHYSICAL.duration[1]))]
-_Mass = Annotated[float, within((0, PHYSICAL.mass[1]))]
+_Positive = Annotated[float, within((0, PHYSICAL.duration[1]))]
 State = Annotated[
     Sequence[float] | str,
     Option(check=Annotated[tuple[_Angle, _Angle, _Speed, _Speed], BeforeValidator(parts_of)]),
 ]
 Schedule = Annotated[
     Sequence[tuple[float, float]] | str,
-    Option(check=Annotated[list[tuple[_Time, _Mass]], BeforeValidator(_pairs)]),
+    Option(check=Annotated[list[tuple[_Positive, _Positive]], BeforeValidator(_pairs)]),
 ]
-Moment = Annotated[datetime | date | str, Option(check=Annotated[Any, BeforeValidator(_moment)])]
+Moment = Annotated[
+    datetime | date | str,
+    Option(check=Annotated[datetime, Field(ge=FIRST, lt=END), BeforeValidator(_moment)]),
+]
 Noise = Annotated[float, within(PHYSICAL.noise)]
 
 EXAMPLE = Path(__file__).with_name("example.toml")
@@ -77,11 +77,6 @@ STRENGTH = 0.3
 """Of the torque that swings an arm round and round."""
 RATE, DURATION, REST = 500.0, 10.0, np.zeros(2)
 LOGS = ("run1", "run2", "run3", "run4", "loaded")
-PROFILE = "arm.toml"
-PROFILE_TEXT = f"""\
-# What the logs of this arm do not say; `inspect LOG {flag("write_profile")} FILE` writes all.
-zero = "hanging"  # θ1 is zero hanging straight down, not along the horizontal
-"""
 
 
 @verb
@@ -112,8 +107,8 @@ def synthesise(
     """Write CASE-unloaded and CASE-loaded logs of a simulated arm; the truth travels with them.
 
     Velocities are in the logs only where angles are exact: with noise or an encoder the arm
-    measures none. `example` writes four runs of a real-looking arm, one with a payload and their
-    profile, for the guide's examples.
+    measures none. `example` writes four runs of a real-looking arm and one with a payload, for the
+    guide's examples; its angles are zero where it hangs straight down, which no log says.
 
     Parameters
     ----------
@@ -181,52 +176,45 @@ def synthesise(
     >>> unloaded.theta.shape, loaded.origin.truth.payload
     ((2, 2001), 0.3515)
     """
-    own, options = locals(), options_of(synthesise)
-    fixed, why = list[str](), "the example is always the same"
+    own, options, fixed, why = locals(), options_of(synthesise), set[str](), ""
     if case == "example":
-        fixed = [name for name in options if name not in ("case", "out", "force")]
+        fixed, why = {*options} - {"case", "out", "force"}, "the example is always the same"
     elif motion is not None:
-        fixed = ["initial", "payload_schedule", "torque"]
+        fixed = {"initial", "payload_schedule", "torque"}
         why = "a motion starts where it was planned and carries one payload"
     for name in fixed:
         if own[name] not in (None, options[name].default):
             raise SettingError(f"{flag(name)}: {why}; leave it out")
     if case == "example":
-        names, simulated = [*(f"{name}.csv" for name in LOGS), PROFILE], example_logs
+        names, format, simulated = [*LOGS], "csv", example_logs  # noqa: A001
     else:
         arm, plan = load_case(str(case)), None if motion is None else read_plan(Path(motion))
         duration = duration or (1.0 if plan is None else plan.duration)
-        given = own | {"start_ns": start_time}
-        of_sensors = {one.name: given[one.name] for one in fields(Sensors)}
-        set_of_them = {name: value for name, value in of_sensors.items() if value is not None}
-        measured = replace(sensors or Sensors(), **set_of_them)
+        moment: Any = start_time  # a datetime by now
+        given = own | {"start_ns": moment and int(moment.timestamp()) * 10**9}
+        of_sensors = {name: given[name] for name in vars(Sensors()) if given[name] is not None}
+        measured = replace(sensors or Sensors(), **of_sensors)
         start: Any = initial or run.Acquisition.initial
         recording = run.Acquisition(rate, duration, start, measured)
         drive = plan or _drive(arm, "case" if torque is None else torque, torque_hold, recording)
-        roles = ["unloaded", "loaded"][: 1 + bool(arm.payload)]
+        names = [f"{arm.name}-unloaded", f"{arm.name}-loaded"][: 1 + bool(arm.payload)]
         if payload_schedule is not None:
-            roles = ["schedule"]
-        names = [f"{arm.name}-{role}.{format}" for role in roles]
+            names = [f"{arm.name}-schedule"]
         said: Any = (arm, drive, recording, progress, payload_schedule)
         simulated = partial(run.synthesise, *said)
-    files = [] if out is None else [Path(out) / name for name in names]
+    files = [] if out is None else [Path(out) / f"{name}.{format}" for name in names]
     for file in files:
         refuse_existing(file, force)
     logs = simulated()
     for file, log in zip(files, logs, strict=False):
         write_log(file, log, force=force)
-    for file in files[len(logs) :]:
-        with whole_file(file, force=force) as temporary:
-            temporary.write_text(PROFILE_TEXT, encoding="utf-8")
     return tuple(logs)  # type: ignore[return-value]  # as many as its docstring says
 
 
 def answer(logs: Sequence[Log], given: Mapping[str, Any]) -> Answer:
     """The files."""
-    names = [f"{log.origin.path}.{given['format']}" for log in logs]
-    if given["case"] == "example":
-        names = [*(f"{log.origin.path}.csv" for log in logs), PROFILE]
-    return Answer([str(Path(given["out"]) / name) for name in names])
+    suffix = "csv" if given["case"] == "example" else given["format"]
+    return Answer([str(Path(given["out"], f"{log.origin.path}.{suffix}")) for log in logs])
 
 
 def _drive(case: Case, given: str | Path | Log, hold: Any, recording: run.Acquisition) -> Torque:

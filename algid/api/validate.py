@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
+from pydantic import BeforeValidator, Field
+
 from algid.api import Answer
 from algid.api.options import AnyResult, LogOptions, Logs, ProfileLike, called, meant, opened, verb
 from algid.base.errors import Exit, SettingError, exit_of
@@ -21,6 +23,10 @@ if TYPE_CHECKING:
     from algid.identification.validate import Validated
     from algid.report.document import Table
 
+Limit = (
+    Annotated[float, within((0, 1e9))]
+    | Annotated[str, Field(pattern=r"^paper$|\.toml$"), BeforeValidator(str)]
+)
 DOUBTFUL = 0.1
 """Of a torque's RMS: a prediction that misses more asks how its logs were read."""
 
@@ -32,7 +38,7 @@ def validate(
     loaded: Logs | None = None,
     *,
     max_nrmse: Annotated[float, within((0, 1e9))] | None = None,
-    max_error: Annotated[float | str | Path, Option(kind=str)] | None = None,
+    max_error: Annotated[float | str | Path, Option(kind=str, check=Limit)] | None = None,
     simulate: bool = False,
     profile: ProfileLike | None = None,
     progress: Progress | None = None,
@@ -102,7 +108,7 @@ def validate(
         urdf = Path(result)
     earlier = result if urdf is None else None
     own, logs, loaded = meant(profile, options, logs, loaded, earlier=earlier)
-    judged = () if max_error is None else tuple(judged_errors(opened(result), max_error))
+    judged = () if max_error is None else tuple(judged_errors(opened(result), max_error))  # type: ignore[arg-type]  # no path by now
     if logs is None and loaded is None:
         if max_error is None:
             raise SettingError(

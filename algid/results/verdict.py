@@ -237,7 +237,8 @@ def share_text(share: float) -> str:
 def _command(result: Result, reasons: Sequence[Notice]) -> str | None:
     """The command to run first: the first cause's remedy, or `algid inspect` without a cause.
 
-    None where neither says more than the call that was made.
+    None where neither says more than the call that was made, or Python or a batch made it: the
+    reason names the flags.
     """
     said = flat(result.profile)
     first = next(iter(of_codes(reasons, *CAUSES, "UNKNOWN_CAUSE")), None)
@@ -253,28 +254,15 @@ def _command(result: Result, reasons: Sequence[Notice]) -> str | None:
     return None if known else again(result, remedy)
 
 
-def again(result: Result, remedy: Remedy) -> str:
-    """The command that identifies again with `remedy`, over the result that is there."""
-    from algid.settings import DEFAULTS, Settings
-
+def again(result: Result, remedy: Remedy) -> str | None:
+    """The command line that made the result, with `remedy`; None where none did."""
     made = result.settings.get("command")
-    if isinstance(made, str):  # of a flag that stands twice the last one counts
-        words = [*shlex.split(made), *remedy.flags]
-    else:  # what Python or a batch was asked for
-        words, own = ["algid", "identify"], flat(result.profile)
-        for log in result.logs:
-            words += [flag("loaded"), log.path] if log.role == "loaded" else [log.path]
-        for name, value in Settings.of(result.settings):
-            if value != DEFAULTS[name] and name not in ("poles", *result.profile):
-                own[name] = value
-        words += Remedy(own | {**remedy.settings}).flags
+    if not isinstance(made, str):
+        return None
+    words = [*shlex.split(made), *remedy.flags]  # of a flag that stands twice the last one counts
     if flag("force") not in words:
         words.append(flag("force"))
     return visible(shlex.join(words), LONGEST_COMMAND)
-
-
-LARGEST = 1e9
-"""Percent."""
 
 
 @dataclass(frozen=True)
@@ -304,7 +292,7 @@ class _Tolerances(BaseModel):
     max_error_percent: dict[str, Annotated[float, Field(ge=0)]] = Field(min_length=1)
 
 
-def judged_errors(result: Result, largest: float | str | Path) -> list[Judged]:
+def judged_errors(result: Result, largest: float | str) -> list[Judged]:
     """Rows of Table 4 beside their limits.
 
     Parameters
@@ -317,37 +305,30 @@ def judged_errors(result: Result, largest: float | str | Path) -> list[Judged]:
     Raises
     ------
     SettingError
-        If the limit is none, or names a parameter that is no row of Table 4.
+        If the file of limits cannot be read, or names a parameter that is no row of Table 4.
     ResultError
         If the result holds no truth to compare with, or no case of the paper.
     """
-    log, word = result.log.path, str(largest)
+    log, limits = result.log.path, dict[str, float]()
     rows = {row.parameter: row for row in result.table4 if row.truth is not None}
     if not rows:
         raise ResultError(
             f"{log}: the log holds no true parameters; only synthetic logs can be checked"
         )
-    if word == "paper":
-        of_paper = {name: row.paper_error_percent for name, row in rows.items()}
-        limits = {name: limit for name, limit in of_paper.items() if limit is not None}
+    if isinstance(largest, float):
+        limits = dict.fromkeys(rows, largest)
+    elif largest == "paper":
+        for name, row in rows.items():
+            if row.paper_error_percent is not None:
+                limits[name] = row.paper_error_percent
         if not limits:
             raise ResultError(
                 f"{log}: not a case of the paper; give {flag('max_error')} in percent"
             )
-    elif word.endswith(".toml"):
-        limits = read_toml(Path(word), _Tolerances).max_error_percent
+    else:
+        limits = read_toml(Path(str(largest)), _Tolerances).max_error_percent
         for name in outside(limits, rows):
             raise SettingError(
-                f"{word}: max_error_percent.{name}: expected one of {', '.join(rows)}"
-            )
-    else:
-        try:
-            limits = dict.fromkeys(rows, float(word))
-        except ValueError:
-            limits = {"": -1.0}
-        if not 0 <= max(limits.values()) <= LARGEST:
-            raise SettingError(
-                f"{flag('max_error')}: expected a number from 0 to {LARGEST:g}, paper, or a TOML "
-                f"file, found {largest!r:.60}"
+                f"{largest}: max_error_percent.{name}: expected one of {', '.join(rows)}"
             )
     return [Judged(name, rows[name].error_percent, limits[name]) for name in within(rows, limits)]

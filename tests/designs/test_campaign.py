@@ -260,7 +260,7 @@ REFUSED = [
     ),
     (["case1", *SENSORS, *LIMITS, "--for", "k9"], "--for k9: expected some of k1"),
     (["case1", *SENSORS, *LIMITS, "--runs", "1,0", "--for", "m_p"], "there are no loaded runs"),
-    (["case1", *SENSORS, *LIMITS, "--joints", "one"], "expected two names like shoulder,elbow"),
+    (["case1", *SENSORS, *LIMITS, "--joints", "one"], "tuple should have at least 2 items"),
     (["nocase", *SENSORS, *LIMITS], "no such case"),
 ]
 

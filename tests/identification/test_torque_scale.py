@@ -115,7 +115,7 @@ def test_the_unit_that_is_advised_ends_in_an_answer_as_typed(tmp_path: Path) -> 
     assert 200 < asked.numbers["mass"] < 350
     (remedy,) = asked.remedies
     assert remedy.flags == ("--torque-unit", "mN m")
-    done = call(*shlex.split(again(read_result(out), remedy))[1:])
+    done = call(*shlex.split(str(again(read_result(out), remedy)))[1:])
     assert done.code == 0, done.err
     result = read_result(out)
     assert not heavy(result)
