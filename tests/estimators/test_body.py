@@ -66,13 +66,3 @@ def test_intervals_hold_where_the_logs_hardly_tell_a_body(bench: Fit, size: floa
     # 92 % less three standard deviations of so many draws: 84.6 %; choosing alone holds 81 %
     least = 0.92 - 3 * (0.92 * 0.08 / DRAWS) ** 0.5
     assert {name: np.mean(each) for name, each in held.items() if np.mean(each) < least} == {}
-
-
-def test_a_body_that_is_certain_is_not_averaged_away(bench: Fit) -> None:
-    true, fit = next(drawn(bench, {"y_p": 30.0, "J_p": 30.0}))
-    chosen = with_body(fit)
-    assert chosen.shared.body == ("y_p", "J_p")
-    found = averaged_over_bodies(chosen)
-    np.testing.assert_array_equal(found.values, chosen.values)
-    np.testing.assert_array_equal(found.covariance, chosen.covariance)
-    assert np.all(np.abs(found.values - true) < 5 * found.std)

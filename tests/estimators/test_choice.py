@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from algid.estimators.problem import WeakSettings
-from algid.estimators.terms import CHOICE, Selection, needs_shape, select
+from algid.estimators.terms import CHOICE, Selection, select
 from algid.identification.identify import identify
-from algid.model import EVERY_TERM, RIGID, TERMS, Model
+from algid.model import RIGID, Model
 from algid.signals.segments import Segment
 from pipelines import elastic
 from tests.estimators.conftest import Bench, problem_of
@@ -47,31 +47,6 @@ def test_the_terms_that_are_there_are_chosen_and_no_other(
     assert len(chosen.trials) == len(CHOICE)
 
 
-@pytest.mark.parametrize(("share", "found"), [(1e-4, False), (0.1, True)])
-@pytest.mark.parametrize("term", ["rotor", "offset"])
-def test_a_term_below_the_sampling_error_of_a_log_without_noise_is_left_out(
-    bench: Bench, term: str, share: float, found: bool
-) -> None:
-    """A hundredth of a period in the stamps makes more of the torque than such a term."""
-    values = term_values(bench, (term,))
-    values |= {name: share * values[name] for name in EVERY_TERM[term].names}
-    log = term_log(bench, Model((term,)), values, noise=0.0)
-    chosen = _of(log, candidates=("rotor", "offset", "gain"))
-    assert chosen.model.terms == ((term,) if found else ())
-    if not found:
-        reasons = {trial.term: trial.reason for trial in chosen.trials}
-        assert reasons[term] == "left out: explains less than sampling leaves open"
-
-
-def test_the_width_of_friction_that_is_asked_for_is_found(bench: Bench) -> None:
-    chosen = _chosen(bench, ("coulomb",), candidates=(), kept=("coulomb",))
-    assert (chosen.chosen_by, chosen.model.terms) == ("settings", ("coulomb",))
-    # velocities are smoothed: a widest guess
-    assert chosen.model.coulomb_speed == pytest.approx(0.05, rel=0.5)
-    shaped = {term for term in TERMS if needs_shape([term])}
-    assert shaped == {"coulomb", "stribeck", "asymmetry", "load"}
-
-
 def test_terms_that_physics_does_not_allow_or_that_need_another_are_left_out(bench: Bench) -> None:
     """Drives that push with the motion are as evident as friction is."""
     pushed = replace(bench.log(sigma=1e-4), tau=bench.log(sigma=1e-4).tau - 0.1 * _signs(bench))
@@ -106,15 +81,6 @@ def test_a_torque_that_acts_late_or_early_is_a_delay_and_no_lag(bench: Bench, sa
     assert (chosen.delay, chosen.model.terms) == (True, ())
     late = chosen.late
     assert late.late == pytest.approx(samples * log.dt, abs=5e-2 * log.dt)
-
-
-def test_torque_that_no_term_explains_refutes_the_first_pass(bench: Bench) -> None:
-    log = bench.log(sigma=1e-4)
-    slow = 0.3 * np.sign(np.sin(2 * np.pi * 1.3 * bench.bare.t))
-    chosen = _of(replace(log, tau=log.tau + slow))
-    assert chosen.refuted
-    assert not chosen.late.determined
-    assert not _of(log).refuted
 
 
 def test_a_rotor_that_is_hardly_significant_stays_where_the_constants_would_take_it_up() -> None:

@@ -15,9 +15,7 @@ from algid.arm import FloatArray, payload_constants, with_payload
 from algid.estimators import weak
 from algid.estimators.combine import LogInformation
 from algid.estimators.diagnostics import (
-    broken_bounds,
     constrained,
-    length_by_constants,
     payload_distance,
     term_worths,
 )
@@ -71,36 +69,6 @@ def test_a_friction_held_at_nothing_moves_the_others_as_conditional_normals(brok
     assert constrained(replace(fit, notes=(before,))).notes == (before, note)
 
 
-def test_a_bound_is_broken_by_what_is_known_alone() -> None:
-    values = K.copy()
-    values[6] = -0.02
-    fit = fit_of(values)
-    (bound,) = broken_bounds(fit)
-    assert bound.bound == "k7 >= 0"
-    assert bound.value == pytest.approx(-0.02)
-    assert bound.distance == pytest.approx(0.02 / fit.std[6], rel=1e-6)
-    assert broken_bounds(replace(fit, status=(*("OK",) * 6, "NOT_IDENTIFIABLE"))) == []
-    (exact,) = broken_bounds(replace(fit, covariance=np.zeros((7, 7))))
-    assert exact.distance is None
-
-
-def test_the_length_by_constants_has_the_error_of_a_ratio() -> None:
-    """Against draws of k1 and k2 by their covariance; a few thousand tell a deviation to 5 %."""
-    fit = fit_of(K)
-    found = length_by_constants(fit)
-    assert found[0] == pytest.approx(9.81 * 0.03 / 1.4)
-    drawn = np.random.default_rng(0).multivariate_normal(
-        fit.values[:2], fit.covariance[:2, :2], 5000
-    )
-    assert found[1] == pytest.approx(np.std(9.81 * drawn[:, 0] / drawn[:, 1]), rel=0.05)
-    assert length_by_constants(fit_of(K[[0, 2, 4, 5, 6]], Model(gravity=0.0))) is None
-    assert length_by_constants(replace(fit, values=K * [1, 0, 1, 1, 1, 1, 1])) is None
-    assert (
-        length_by_constants(replace(fit, status=("OK", "NOT_IDENTIFIABLE", *("OK",) * 5))) is None
-    )
-    assert length_by_constants(replace(fit, status=("NOT_IDENTIFIABLE", *("OK",) * 6))) is None
-
-
 def test_a_terms_worth_is_schwarzs_price_less_walds_statistic() -> None:
     model = Model(("coulomb", "rotor"))
     fit = fit_of(np.array([*K, 0.3, 0.2, 0.004, 0.002]), model, delay=True)
@@ -118,25 +86,6 @@ def test_a_terms_worth_is_schwarzs_price_less_walds_statistic() -> None:
     V = correlated.covariance[7:9, 7:9]
     wald = fit.values[7:9] @ np.linalg.solve(V, fit.values[7:9])
     assert next(term_worths(correlated))[1] == pytest.approx(2 * np.log(400) - wald, rel=1e-6)
-
-
-def test_logs_of_one_arm_are_not_taken_for_those_of_two(bench: Bench) -> None:
-    """A log of each kind, four seconds: few stretches tell a variance, and none of 12 pairs is 5
-    deviations apart.
-
-    Without the freedom of so few stretches 1 pair in 6 was. Friction that is another's is still
-    told.
-    """
-    found = []
-    for seed in range(12):
-        logs = [bench.log(loaded, 1e-3, 20 + seed) for loaded in (False, True)]
-        found.append(payload_distance(weak.fit(problem_of(logs[0], loaded=logs[1:]))))
-    apart = [distance for distance in found if distance is not None]
-    assert len(apart) == 12
-    assert max(apart) < 5
-    other = replace(logs[1], tau=logs[1].tau + 0.5 * bench.arm.b2 * bench.burdened.omega)
-    told = payload_distance(weak.fit(problem_of(logs[0], loaded=[other])))
-    assert told > 5
 
 
 def test_the_distance_of_two_arms_is_that_of_what_no_payload_explains(bench: Bench) -> None:

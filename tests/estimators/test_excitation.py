@@ -9,12 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from algid.arm import with_payload
-from algid.estimators import robust, weak
-from algid.estimators.diagnostics import ratio_of_joints
-from algid.estimators.excitation import UNLIKE, UNLIKE_IN_MANY, contradicted
-from algid.estimators.problem import WeakSettings
-from algid.model import RIGID, Model
+from algid.estimators import weak
+from algid.estimators.excitation import contradicted
 from algid.notices import Notice
 from algid.signals.segments import Segment
 from algid.synth.excitation import wide_multi_sine
@@ -23,19 +19,6 @@ from algid.synth.simulator import simulate
 from .conftest import DT, Bench, problem_of
 
 REFUTED = Notice("REFUTED", numbers={"case": "noise", "kept": "weak"})
-
-
-@pytest.mark.parametrize("idle", [0, 1])
-def test_a_joint_that_is_hardly_driven_is_told_by_the_other(bench: Bench, idle: int) -> None:
-    """Of one joint a fiftieth of the torque is left: so is a fiftieth of its constants."""
-    share = np.ones((2, 1))
-    share[idle] = 0.02
-    log = bench.log(sigma=1e-4)
-    normal = weak.normal_equations(lambda: [replace(log, tau=log.tau * share)], WeakSettings())
-    ratio = ratio_of_joints([normal], Model(), UNLIKE)
-    assert ratio == pytest.approx(share[1, 0] / share[0, 0], rel=0.03)
-    sound = weak.normal_equations(lambda: [log], WeakSettings())
-    assert ratio_of_joints([sound], Model(), UNLIKE_IN_MANY) is None
 
 
 @pytest.mark.parametrize(
@@ -98,18 +81,3 @@ def test_a_refuted_log_in_which_a_joint_stood_still_is_not_ok(bench: Bench) -> N
     found = contradicted(fit, problem_of(still))
     assert found.text == "joint 2 never moved: give a log in which both joints do"
     assert contradicted(weak.fit(problem_of(log)), problem_of(log)) is None
-
-
-def test_an_arm_that_a_payload_outweighs_is_not_thrown_away(bench: Bench) -> None:
-    """The loaded log needs many times the torque of the arm alone, which is driven nevertheless."""
-    payload = 5 * bench.arm.m2
-    heavy = with_payload(bench.arm.constants(), bench.arm.payload_constants(payload))
-    wide = wide_multi_sine(bench.arm, 4)
-    wide = replace(wide, amplitude=tuple(tuple(8 * a for a in joint) for joint in wide.amplitude))
-    motion = simulate(heavy, wide, np.arange(4001) * DT)
-    bare, burdened = bench.log(sigma=1e-4), Segment(0.0, DT, motion.theta, motion.tau)
-    assert np.all(np.std(burdened.tau, axis=1) > 5 * np.std(bare.tau, axis=1))
-    fit = robust.fit(problem_of(bare, loaded=[burdened]))
-    assert set(fit.status) == {"OK"}
-    for name, true in zip(RIGID, bench.truth, strict=False):
-        assert fit.values[fit.names.index(name)] == pytest.approx(true, rel=0.02), name

@@ -34,13 +34,10 @@ def motion_of(count: int = 400) -> Motion:
     return Motion(*(size * rng.standard_normal((2, count)) for size in (1.0, 3.0, 20.0)))
 
 
-def told(
-    model: Model, c: FloatArray, motion: Motion, beside: FloatArray, *, delay: bool = False
-) -> tuple[Products, float]:
+def told(model: Model, c: FloatArray, motion: Motion, beside: FloatArray) -> tuple[Products, float]:
     """The test of a log with white noise of unit deviation, and with the torque `beside`."""
     rng = np.random.default_rng(6)
-    shared, error = Shared(model, delay), rng.standard_normal(motion.theta.shape) + beside
-    at = {False: np.append(c, 0.0) if delay else c}
+    shared, error = Shared(model), rng.standard_normal(motion.theta.shape) + beside
 
     def products(whole: Shared, c: FloatArray, more: Beside) -> tuple[FloatArray, float]:
         c = c[:-1]
@@ -53,8 +50,8 @@ def told(
 
     log = SimpleNamespace(products=products, loaded=False, trained=motion.theta.shape[1])
     log.kept = [SimpleNamespace(dt=DT, tau=np.ones((2, 1)))]
-    found = Products([log], shared, at, 0.0, shapes)  # type: ignore[list-item]
-    fit = SimpleNamespace(names=shared.names, values=at[False], shared=shared)
+    found = Products([log], shared, {False: c}, 0.0, shapes)  # type: ignore[list-item]
+    fit = SimpleNamespace(names=shared.names, values=c, shared=shared)
     return found, misfit(fit, found, None)  # type: ignore[arg-type]
 
 
@@ -82,15 +79,6 @@ def test_a_term_explains_what_least_squares_with_it_does(term: str) -> None:
     _, without, _ = found.solve(found.columns(["coulomb"]))
     _, left, _ = found.solve(found.columns(["coulomb", term]))
     assert without - left == pytest.approx(explained, rel=1e-3)
-
-
-@pytest.mark.parametrize("delay", [False, True])
-def test_a_delay_is_a_misfit_where_none_is_estimated(delay: bool) -> None:
-    """The torque acts 5 ms late: beside an estimated delay nothing is left of it."""
-    motion, model = motion_of(), Model(("coulomb",))
-    late = np.gradient(torque(model, C, motion), DT, axis=1) * 5e-3
-    _, p_value = told(model, C, motion, late, delay=delay)
-    assert (p_value < 1e-4) is not delay
 
 
 def test_white_noise_is_no_misfit_and_a_shape_of_no_term_is() -> None:

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from algid import arm
 from algid.model import (
     TERMS,
     UNITS,
@@ -79,14 +78,6 @@ def test_the_regressor_gives_the_torque_and_is_its_slope_where_the_torque_is_lin
     )
     with pytest.raises(ValueError, match=r"load, gain.* depends on the coefficients"):
         regressor(FULL, _motion())
-
-
-def test_plain_columns_are_those_of_the_arm() -> None:
-    motion = _motion()
-    ours = regressor(Model(), motion)
-    for place, k in enumerate(np.eye(7)):
-        theirs = arm.inverse_dynamics(k, motion.theta, motion.omega, motion.alpha)
-        assert np.allclose(ours[:, place], theirs, atol=1e-13)  # rounding
 
 
 def test_terms_are_named_in_one_order_and_unknown_ones_refused() -> None:

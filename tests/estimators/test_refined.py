@@ -47,14 +47,6 @@ def test_intervals_of_arm_and_payload_hold(bench: Bench) -> None:
     holds_95(np.array(ratios))
 
 
-def test_known_noise_levels_are_kept(bench: Bench) -> None:
-    known = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
-    fit = refined.fit(problem_of(bench.log(sigma=1e-3)), noise=known)
-    assert fit.noise == (known,)
-    estimated = refined.fit(problem_of(bench.log(sigma=1e-3)))
-    assert fit.iterations <= estimated.iterations
-
-
 def test_noise_levels_of_zero_are_refused(bench: Bench) -> None:
     with pytest.raises(ValueError, match="positive"):
         refined.fit(problem_of(bench.log()), noise=NoiseLevels(np.zeros(2), np.ones(2)))

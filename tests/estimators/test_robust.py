@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.base.criteria import AT_REST
 from algid.estimators import instruments, robust, weak
-from algid.estimators.combine import LogInformation, Prior
+from algid.estimators.combine import LogInformation
 from algid.estimators.fit import Fit
 from algid.estimators.modulating_functions import OVERLAP
 from algid.estimators.parametrisation import Shared
@@ -34,7 +33,7 @@ from pipelines.disturbed import DT, Scene, scene
 from pipelines.race_peers import even
 from pipelines.run_to_run import runs as runs_of
 
-from .conftest import Bench, problem_of
+from .conftest import problem_of
 
 SETTINGS = WeakSettings(bandwidth=60.0)
 SHARED = Shared(Model(("offset",)))
@@ -92,35 +91,6 @@ def test_dispersion_is_the_variance_of_scores_over_the_information() -> None:
 
 def least_squares(sources: Sequence[Source], settings: WeakSettings) -> Fit:
     return RobustProblem.of(Problem(sources, (), settings)).least_squares()
-
-
-def _rubbing(bench: Bench, part: slice) -> Segment:
-    """A log of white noise and of Coulomb friction that only the torque feels."""
-    log = bench.log(sigma=1e-4).part(part.start, part.stop)
-    omega = np.gradient(log.theta, log.dt, axis=1)
-    return Segment(
-        log.start, log.dt, log.theta, log.tau + np.array([[0.05], [0.02]]) * np.tanh(omega / 0.2)
-    )
-
-
-def test_least_squares_with_the_same_prior_gives_the_same(bench: Bench) -> None:
-    logs = [_rubbing(bench, slice(start, start + 1300)) for start in (0, 1300, 2600)]
-    sources = problem_of(*logs).unloaded
-    found = least_squares(sources, SETTINGS)
-    still = AT_REST * weak.speeds(sources, SETTINGS)
-    same = WeakSettings(
-        found.shared.model, bandwidth=60.0, estimate_delay=True, rest=(still[0], still[1])
-    )
-    free = weak.fit(Problem(sources, settings=same))
-    phi = np.trace(free.logs[0].total[0]) / np.trace(found.logs[0].total[0])
-    prior = Prior(found.shrinkage.names, found.shrinkage.mean, phi * found.shrinkage.precision)
-    every = weak.fit(Problem(sources, settings=same, prior=prior))
-    assert every.names == found.names
-    # weights rest on another residual
-    np.testing.assert_allclose(every.values[:7], found.values[:7], rtol=6e-3)
-    np.testing.assert_allclose(found.values[:7], bench.truth[:7], rtol=5e-3)
-    friction = [found.values[found.names.index(name)] for name in ("f1", "f2")]
-    np.testing.assert_allclose(friction, [0.05, 0.02], rtol=0.1)
 
 
 def coloured(rng: np.random.Generator, keep: float, count: int) -> FloatArray:

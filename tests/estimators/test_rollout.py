@@ -7,8 +7,6 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.estimators.prediction import (
-    HORIZONS,
-    _angles_at_horizons,
     rollouts,
 )
 from algid.model import Model
@@ -30,21 +28,6 @@ def segment() -> Segment:
     t = np.arange(0, 8 + DT / 2, DT)
     moved = simulate(K, push, t)
     return Segment(0.0, DT, moved.theta, moved.tau)
-
-
-def test_angles_are_the_simulators() -> None:
-    step = 2e-3
-    starts = np.array([[-1.5, -1.0], [0.2, -0.4], [1.0, -2.0], [0.5, 3.0]])
-    t = np.arange(2 * round(HORIZONS[-1] / step) + 1) * step / 2
-    u = np.repeat(push(t).T[:, :, None], 2, axis=2)
-    found = _angles_at_horizons(Model(), K, starts, u, step)
-    for start in range(2):
-        whole = simulate(K, push, np.array([0.0, *HORIZONS]), starts[:2, start], starts[2:, start])
-        for place, angles in enumerate(found):
-            # step⁴ twice
-            np.testing.assert_allclose(
-                angles[:, start], whole.theta[:, place + 1], rtol=0, atol=1e-7
-            )
 
 
 def test_a_wrong_arm_does_as_its_simulation_says(segment: Segment) -> None:

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.estimators.prediction import PredictionScore, score, sums_of
+from algid.estimators.prediction import PredictionScore, sums_of
 from algid.model import Model
-from algid.signals.segments import Segment
 
 MODEL = Model(("coulomb",), coulomb_speed=0.1)
 FRICTION = 0.3
@@ -39,14 +38,3 @@ def test_a_torque_within_friction_at_rest_is_no_error() -> None:
     assert rest[0] == pytest.approx(np.sqrt((0.25**2 + 0.5**2) / 2))
     assert moving[0] == pytest.approx(0.1)
     assert np.isnan(PredictionScore().by_state).all()
-
-
-def test_a_score_splits_its_residual_among_moving_and_standing_joints() -> None:
-    t = 2e-3 * np.arange(3000)
-    theta = np.stack([np.where(t < 3, 0.0, np.sin(2 * (t - 3)) ** 3), 0 * t])
-    log = Segment(0.0, 2e-3, theta, 0.2 * np.ones_like(theta))
-    found = score(MODEL, coefficients(), [log])
-    _, _, _, residual, moving, moved, still, left, _ = found.sums
-    assert moving + still == pytest.approx([found.count, found.count])
-    assert moved + left == pytest.approx(residual, rel=1e-9)
-    assert found.by_state[2, 0] < 0.2 * found.by_state[1, 0]

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +13,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.signal import lfilter
 
 from algid.arm import CONSTANT_NAMES, FloatArray, forward_dynamics, with_payload
-from algid.estimators import refined, weak
+from algid.estimators import instruments, refined, weak
 from algid.estimators.fit import Fit
 from algid.estimators.problem import WeakSettings
 from algid.model import TERMS, UNITS, Model, Motion
@@ -93,14 +96,34 @@ def _behind(tau: FloatArray, lag: float) -> FloatArray:
     return np.asarray(shown)
 
 
-def _fit(estimator: str, model: Model, log: Segment, loaded: Sequence[Segment] = ()) -> Fit:
-    known = problem_of(log, loaded=loaded, settings=WeakSettings(model=model))
-    return weak.fit(known) if estimator == "weak" else refined.fit(known)
+FITS = {"weak": weak.fit, "refined": refined.fit, "instruments": instruments.fit}
+
+
+def _fit(
+    estimator: str, model: Model, log: Segment, loaded: Sequence[Segment] = (), **more: Any
+) -> Fit:
+    settings = WeakSettings(model=model, **more)
+    return FITS[estimator](problem_of(log, loaded=loaded, settings=settings))
 
 
 @pytest.mark.parametrize("estimator", ["weak", "refined"])
-@pytest.mark.parametrize("term", TERMS)
-def test_each_term_is_found(bench: Bench, term: str, estimator: str) -> None:
+@pytest.mark.parametrize("samples", [20, 50])
+def test_long_delays_are_found(bench: Bench, estimator: str, samples: int) -> None:
+    log = bench.log(sigma=SIGMA)
+    late = replace(log, theta=log.theta[:, :-samples], tau=log.tau[:, samples:], omega=None)
+    fit = _fit(estimator, Model(), late, estimate_delay=True)
+    assert (fit.estimator, fit.names[-1]) == (estimator, "delay")
+    assert abs(fit.values[-1] - samples * DT) < 5 * fit.std[-1] < 0.05 * samples * DT
+
+
+@pytest.mark.parametrize(
+    ("estimator", "term"),
+    [
+        *product(("weak", "refined"), TERMS),
+        *product(["instruments"], ("coulomb", "offset", "rotor")),
+    ],
+)
+def test_each_term_is_found(bench: Bench, estimator: str, term: str) -> None:
     needed = TERMS[term].needs
     terms = (term,) if needed is None else (needed, term)
     model, values = Model(terms), term_values(bench, terms)

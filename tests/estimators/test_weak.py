@@ -1,14 +1,11 @@
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from algid.arm import FloatArray
 from algid.estimators import weak
-from algid.estimators.innovations import ResidualSums, residual_sums
 from algid.estimators.problem import Problem, WeakSettings
-from algid.model import Model
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
@@ -60,21 +57,3 @@ def test_a_gap_starts_new_windows(bench: Bench) -> None:
     first, second = log.part(0, 1800), replace(log.part(2300, 4001), continues=False)
     fit = weak.fit(Problem([lambda: [first, second]]))
     assert np.allclose(fit.values, bench.truth[:7], rtol=1e-3)
-
-
-def test_residuals_of_a_long_log_are_added_up_as_it_is_gone_over(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    held: list[int] = []
-
-    def sums(rows: FloatArray, *how: Any) -> ResidualSums:
-        held.append(rows.shape[1])
-        return residual_sums(rows, *how)
-
-    monkeypatch.setattr(weak, "PIECE_SAMPLES", 2048)
-    monkeypatch.setattr(weak, "residual_sums", sums)
-    t = 1e-3 * np.arange(300_000)
-    log = Segment(0.0, 1e-3, np.stack([np.sin(t), np.cos(t)]), np.stack([np.cos(t), np.sin(t)]))
-    weak.residuals(lambda: [log], WeakSettings(), np.zeros(len(Model().names)))
-    assert sum(held) > 5000
-    assert max(held) < 2500
