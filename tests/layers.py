@@ -58,7 +58,7 @@ def breaches(sources: Mapping[str, str], table: Mapping[str, Room]) -> Iterator[
         if own not in table:
             yield f"{module}: the room {own} is not in the table"
             continue
-        for name in imported(module, text, sources):
+        for name in imported(text, sources):
             wrong = _misfit(own, name, sources, table[own])
             if wrong:
                 yield f"{module}: {wrong}"
@@ -67,7 +67,7 @@ def breaches(sources: Mapping[str, str], table: Mapping[str, Room]) -> Iterator[
 def _misfit(own: str, name: str, sources: Mapping[str, str], allowed: Room) -> str | None:
     top = name.partition(".")[0]
     if name == "?":
-        return "an import whose name is computed"
+        return "an import whose name is computed or relative"
     if top == "algid":
         other = _room(name if name in sources else name.rpartition(".")[0])
         if name == "algid.__version__" or other == own or other in allowed.rooms:
@@ -97,16 +97,16 @@ def parsed(text: str) -> ast.Module:
     return ast.parse(text)
 
 
-def imported(module: str, text: str, sources: Mapping[str, str]) -> Iterator[str]:
+def imported(text: str, sources: Mapping[str, str]) -> Iterator[str]:
     """What a module's text imports, anywhere in it, by exact names.
 
-    "?" where a name is computed.
+    "?" where a name is computed or relative.
     """
     for node in ast.walk(parsed(text)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            base = _absolute(module, node, sources)
+            base = "?" if node.level else node.module or ""
             for alias in node.names:
                 exact = f"{base}.{alias.name}"
                 yield exact if exact in sources or base == "algid" else base
@@ -120,15 +120,6 @@ def imported(module: str, text: str, sources: Mapping[str, str]) -> Iterator[str
                 if isinstance(first, ast.Constant) and isinstance(first.value, str)
                 else "?"
             )
-
-
-def _absolute(module: str, node: ast.ImportFrom, sources: Mapping[str, str]) -> str:
-    if not node.level:
-        return node.module or ""
-    is_package = any(other.startswith(f"{module}.") for other in sources)
-    parts = module.split(".")
-    parts = parts[: len(parts) - node.level + is_package]
-    return ".".join([*parts, *([node.module] if node.module else [])])
 
 
 def _imports(function: ast.expr) -> bool:

@@ -67,6 +67,17 @@ def test_error_bars_are_those_of_an_independent_bound(case: str) -> None:
         np.testing.assert_allclose(std, expected, rtol=0.02)
 
 
+def test_each_run_counts_by_itself_and_each_part_of_a_motion_too() -> None:
+    belief, x = belief_of("case1"), drawn(1)
+    slopes = Sensitivities(belief.shared.model, motion_at(x, middles(FAMILY.duration, 50.0)), 50.0)
+    bare, burdened, both = (
+        Information(Experiment(belief.shared, runs, NOISE, 500.0), belief.mean, slopes)
+        for runs in ((1, 0), (0, 1), (3, 1))
+    )
+    np.testing.assert_allclose(both.S, 3 * bare.S + burdened.S, rtol=1e-9)
+    np.testing.assert_allclose(both.parts(40).sum(axis=0), both.S, rtol=1e-9)
+
+
 def test_gradient_by_the_motion_is_that_of_differences() -> None:
     belief, rate = belief_of("case1"), 50.0
     asked = Objective(np.abs(belief.mean), *(np.ones(belief.mean.size, bool),) * 2)

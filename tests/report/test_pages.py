@@ -242,10 +242,3 @@ def test_markdown_has_every_table_and_a_command_that_can_be_copied() -> None:
     assert after.rstrip().endswith("</details>")
     assert "| :-- | --: |" in before
     assert "empty" not in text
-
-
-def test_the_figure_of_a_result_has_every_estimate(result: Result) -> None:
-    import algid
-
-    plot = algid.Result.of(result).plot()
-    assert list(plot.data[0].y) == [*result.parameters, *result.payload]

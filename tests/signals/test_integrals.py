@@ -29,13 +29,3 @@ def test_error_falls_with_the_fourth_power_of_the_sample_time(order: int) -> Non
 def test_cubics_are_integrated_exactly() -> None:
     t = 0.1 * np.arange(12)
     np.testing.assert_allclose(integral(4 * t**3 - 2 * t, 0.1), t**4 - t**2, atol=1e-14)
-
-
-def test_leading_axes_are_kept() -> None:
-    signal = np.random.default_rng(0).normal(size=(3, 2, 50))
-    np.testing.assert_array_equal(integral(signal, 0.1)[1, 0], integral(signal[1, 0], 0.1))
-
-
-def test_wrong_calls_say_what_was_wrong() -> None:
-    with pytest.raises(ValueError, match="at least 4 samples, got 3"):
-        integral(np.zeros(3), 0.1)

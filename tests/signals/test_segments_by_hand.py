@@ -9,8 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.interpolate import BarycentricInterpolator
 
 from algid.log import Log, Origin
@@ -149,15 +147,3 @@ def test_pieces_have_the_lengths_that_they_promise(
         else:
             cut.append([len(piece)])
     assert cut == expected
-
-
-@given(parts=st.lists(st.lists(st.integers(1, 35), min_size=1, max_size=5), min_size=1, max_size=4))
-def test_pieces_do_not_depend_on_how_a_stretch_came_in(parts: list[list[int]]) -> None:
-    one, other = (
-        list(pieces(stretches(kind), 10)) for kind in (parts, [[sum(lengths)] for lengths in parts])
-    )
-    assert [len(piece) for piece in one] == [len(piece) for piece in other]
-    for mine, whole in zip(one, other, strict=True):
-        np.testing.assert_array_equal(mine.theta, whole.theta)
-        assert mine.continues == whole.continues
-        assert mine.start == pytest.approx(whole.start, abs=1e-9)

@@ -17,7 +17,6 @@ from algid.arm import FloatArray
 from algid.tracks.cells import CELL, Cells
 from algid.tracks.change_points import (
     CHANCE,
-    SHORTEST,
     cuts,
     excess,
     first_segmentation,
@@ -138,15 +137,6 @@ def test_a_step_between_parts_is_no_excess() -> None:
     assert excess(A, B, parts, robust=False) == 1.0
 
 
-def test_errors_of_the_constants_are_taken_from_the_excess() -> None:
-    rng = np.random.default_rng(1)
-    A, T = np.full(2000, 2.0), np.repeat(rng.standard_normal((40, 1)), 50, axis=0)
-    wrong, whole = 3.0, [(0, 2000)]
-    B = np.sqrt(A) * rng.standard_normal(2000) + T[:, 0] * wrong
-    assert excess(A, B, whole) > 5
-    assert excess(A, B, whole, known=(T, np.array([[4 * wrong**2]]))) < 2
-
-
 @pytest.mark.parametrize("step", [0.0, 1.0])
 def test_edges_of_a_simulated_log_are_its_own(step: float) -> None:
     rng = np.random.default_rng(5)
@@ -172,9 +162,3 @@ def test_white_logs_are_left_whole() -> None:
     assert [first_segmentation(cells_of(np.full(300, 0.5), rng))[0] for _ in range(40)] == [
         [0, 300]
     ] * 40
-
-
-def test_no_stretch_is_shorter_than_the_shortest() -> None:
-    rng = np.random.default_rng(7)
-    cells = cells_of(np.repeat([0.0, 8.0, 0.0], [60, SHORTEST - 4, 60]), rng)
-    assert min(b - a for a, b in pairwise(first_segmentation(cells)[0])) >= SHORTEST

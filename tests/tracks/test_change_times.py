@@ -8,14 +8,11 @@ import numpy as np
 import pytest
 
 import algid
-from algid.estimators.whitening import Linearised, covariance_factor
 from algid.log import Log
-from algid.model import Motion
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.segments import segments
 from algid.tracks.change_times import (
     ChangeTime,
-    Rows,
     confirmed,
     place,
     rows_of,
@@ -99,32 +96,6 @@ def test_the_residual_of_the_arm_and_its_payload_is_white(picking: Log) -> None:
     behind = left[np.repeat((rows.t > 1.45) & (rows.t < 1.7), 2)]
     assert np.mean(behind**2) == pytest.approx(1.0, abs=5 * np.sqrt(2 / behind.size))
     assert place(rows, 1.3, 1.7, 1.0).time == pytest.approx(1.5, abs=0.03)
-
-
-@pytest.mark.parametrize("alike", [1, 200])
-def test_rows_that_err_alike_are_worth_as_much_less(alike: int) -> None:
-    """Errors that 200 rows share bring a score's variance to 200 times that of white rows.
-
-    a change has to beat it.
-    """
-    rng = np.random.default_rng(5)
-    n = 3000
-    t, g = 1e-3 * np.arange(n), np.ones((2, n))
-    H = np.zeros((2, 2, POINTS, n))
-    still = Motion(*np.zeros((3, 2, n)))
-    linear = Linearised(np.zeros((0, 2 * n)), covariance_factor(H), H, 0, g, still)
-    worths = []
-    for _ in range(60):
-        shared = np.repeat(rng.standard_normal((n // alike, 2)), alike, axis=0)
-        step = 0.1 * (t > 1.5)[:, None]
-        rows = Rows(t, 1e-3, g, (shared + step).ravel(), np.zeros((2, 2, n)), linear)
-        worths.append(place(rows, 1.5, 1.5, 1.0).gain)
-    # a step of 0.1 amid 6,000 rows of variance one is worth 0.1² · 6000 / 4 squares,
-    # and one chance more; where 200 rows are one, chance alone is three times its half a square
-    if alike == 1:
-        assert np.median(worths) == pytest.approx(15, rel=0.3)
-    else:
-        assert np.median(worths) < 4
 
 
 def test_brackets_hold_the_time_of_a_heavy_payload_amid_noisy_angles() -> None:
