@@ -22,7 +22,6 @@ from typing import Any
 import h5py
 import numpy as np
 import pandas as pd
-import polars as pl
 import pyarrow as pa
 import pyarrow.parquet as parquet
 import zstandard
@@ -32,7 +31,6 @@ import algid
 from algid.arm import FloatArray
 from algid.base.ros2 import JOINT_STATE_DEFINITION
 from algid.base.units import TORQUE
-from tests.readers.mcaps import ANY, Schema
 from tests.readers.ways import (
     EPOCH,
     FLAT,
@@ -247,46 +245,27 @@ def decimal_comma(separator: str) -> str:
 def named_matrix(way: str, folder: Path) -> Any:
     """Matrices of elbow and shoulder, beside whose names."""
     q, tau, names = TH[::-1].T.copy(), TA[::-1].T.copy(), ["elbow", "shoulder"]
-    content: dict[str, Any] = {"time": T, "q": q, "tau": tau}
-    path = folder / f"log.{way}"
-    rows = {"time": T, "joint_names": [names] * N, "q": q.tolist(), "tau": tau.tolist()}
-    match way:
-        case "h5":
-            with h5py.File(path, "w") as file:
-                for name, values in content.items():
-                    file[name] = values
-                file["q"].attrs["names"] = names
-                file.attrs["joint_names"] = names
-                file["joint_names"] = np.array(names, "S")
-        case "parquet" | "feather":
-            stated = {"joint_names": json.dumps(names)}
-            table = pa.table({"time": T, "q": list(q), "tau": list(tau)})
-            fields = [one.with_metadata({"names": json.dumps(names)}) for one in table.schema]
-            store_table(path, table.cast(pa.schema(fields, metadata=stated)))
-        case "npz" | "mat" | "dict":
-            said = np.array(names, object if way == "mat" else None)
-            return _arrays(way, folder, {**content, "joint_names": said})
-        case "pandas":
-            return pd.DataFrame(rows)
-        case "polars":
-            return pl.DataFrame(rows)
-        case "jsonl":
-            lines = [json.dumps(dict(zip(rows, row, strict=True))) for row in _by_row(rows)]
-            path.write_text("\n".join(lines) + "\n")
-        case "json":
-            objects = [dict(zip(list(rows)[1:], row[1:], strict=True)) for row in _by_row(rows)]
-            return _objects(folder, objects)
-        case _:
-            raise CannotSayError
-    return path
+    matrices = {"time": T, "q": q, "tau": tau}
+    lists = {"time": T, "q": q.tolist(), "tau": tau.tolist()}
+    if way == "h5":
+        path = store(folder / "log.h5", {**matrices, "joint_names": np.array(names, "S")})
+        with h5py.File(path, "a") as file:
+            file.attrs["joint_names"] = file["q"].attrs["names"] = names
+        return path
+    if way in ("parquet", "feather"):
+        text = json.dumps(names)
+        stated = {name: {"names": text} for name in ("q", "tau")}
+        return written(way, folder, Flat(lists, stated, {"joint_names": text}))
+    if way in ("npz", "mat", "dict"):
+        said = np.array(names, object if way == "mat" else None)
+        return _arrays(way, folder, {**matrices, "joint_names": said})
+    if way in ("pandas", "polars", "jsonl", "json"):
+        return written(way, folder, Flat({**lists, "joint_names": [names] * N}))
+    raise CannotSayError
 
 
 def _by_row(columns: Mapping[str, Any]) -> Any:
     return zip(*(list(values) for values in columns.values()), strict=True)
-
-
-def _objects(folder: Path, objects: list[dict[str, Any]], schema: Schema = ANY) -> Path:
-    return json_mcap(folder, zip(NS.tolist(), map(json.dumps, objects), strict=True), schema)
 
 
 def json_schema_unit(way: str, folder: Path) -> Path:
@@ -297,7 +276,8 @@ def json_schema_unit(way: str, folder: Path) -> Path:
     columns = {name: v.tolist() for name, v in base(tau=MNM).items() if name != "time"}
     objects = [dict(zip(columns, row, strict=True)) for row in _by_row(columns)]
     schema = json.dumps({"type": "object", "properties": kinds}).encode()
-    return _objects(folder, objects, ("arm", "jsonschema", schema))
+    rows = zip(NS.tolist(), map(json.dumps, objects), strict=True)
+    return json_mcap(folder, rows, ("arm", "jsonschema", schema))
 
 
 def indexed(index: Any) -> Written:
@@ -351,31 +331,25 @@ def effort_elsewhere() -> list[Message]:
 
 
 def column_twice(way: str, folder: Path) -> Any:
-    path = folder / f"log.{way}"
-    objects = [dict(zip(base(), map(float, row), strict=True)) for row in _by_row(base())]
-    texts = [json.dumps(one)[:-1] + ', "tau1": 5.0}' for one in objects]
-    table = arrow_table(Flat(base())).append_column("tau1", pa.array(np.full(N, 5.0)))
-
-    def of_text(separator: str) -> str:
-        header, *rows = csv_text(Flat(base()), separator).splitlines()
-        return "\n".join([f"{header}{separator}tau1", *(f"{row}{separator}5" for row in rows), ""])
-
-    match way:
-        case "json":
-            return json_mcap(folder, zip(NS.tolist(), texts, strict=True))
-        case "jsonl":
-            path.write_text("\n".join(texts) + "\n")
-        case "parquet":
-            parquet.write_table(table, path)
-        case "feather":
-            with pa.OSFile(str(path), "wb") as out, pa.ipc.new_file(out, table.schema) as file:
-                file.write_table(table)
-        case "pandas":
-            frame = pd.DataFrame(base())
-            frame.insert(5, "tau1", 5.0, allow_duplicates=True)
-            return frame
-        case _:
-            return text_file(of_text)(way, folder)
+    """A torque whose name stands twice, the second time with other values."""
+    path, columns = folder / f"log.{way}", base(tau_1=np.full(N, 5.0))
+    if way == "pandas":
+        return pd.DataFrame(columns).rename(columns={"tau_1": "tau1"})
+    if way in ("parquet", "feather"):
+        table = arrow_table(Flat(columns)).rename_columns([*base(), "tau1"])
+        if way == "parquet":
+            return store_table(path, table)
+        with pa.OSFile(str(path), "wb") as out, pa.ipc.new_file(out, table.schema) as file:
+            file.write_table(table)
+        return path
+    if way not in (*_TEXT, "jsonl", "json"):
+        raise CannotSayError
+    written("jsonl" if way == "json" else way, folder, Flat(columns))
+    text = path.with_suffix(".jsonl" if way == "json" else path.suffix).read_text()
+    text = text.replace("tau_1", "tau1")
+    if way == "json":
+        return json_mcap(folder, zip(NS.tolist(), text.splitlines(), strict=True))
+    path.write_text(text)
     return path
 
 

@@ -12,12 +12,12 @@ import pandas as pd
 import polars as pl
 import pyarrow as pa
 import pytest
-from mcap.writer import Writer
 
 import algid
 from algid.base.errors import LogError
 from algid.profile import Profile
 from algid.readers import open_log, read_log
+from tests.readers.ways import json_mcap
 
 COLUMNS = ("time", "q1", "q2", "tau1", "tau2")
 ROWS = 50
@@ -64,25 +64,6 @@ def test_what_a_comment_states_is_told_and_not_used(
     assert len(said) == bool(settings)
 
 
-@pytest.mark.parametrize(
-    "settings",
-    [
-        {"rate": 100.0},
-        {"topic": "/joint_states"},
-        {"clock": "log"},
-        {"columns": ("a", "b", "c", "d", "e")},
-        {"velocity": "measured"},
-        {"omega1": {"unit": "deg"}},
-    ],
-    ids=str,
-)
-def test_a_setting_of_no_use_is_told(settings: dict[str, object], tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text(table("#"))
-    log = read_log(tmp_path / "log.csv", Profile.model_validate(settings))
-    (said,) = [one for one in log.notices if one.code == "STATED_UNUSED"]
-    assert set(settings) <= set(said.numbers["said"].split(", "))
-
-
 def test_metadata_that_are_no_units_are_left_alone() -> None:
     metadata = {
         "units": "{" * 9000,
@@ -104,21 +85,13 @@ def test_topics_that_share_no_row_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_unit_of_a_json_schema_may_stand_at_a_lists_items(tmp_path: Path) -> None:
-    number = {"type": "number", "unit": "mNm"}
-    effort = {"type": "array", "items": number, "description": "measured"}
+    effort = {"type": "array", "items": {"unit": "mNm"}, "description": "measured"}
     schema = {"properties": {"state": {"type": "object", "properties": {"effort": effort}}}}
-    path, messages = tmp_path / "log.mcap", list[bytes]()
+    rows = []
     for place in range(20):
         state = {"name": ["a", "b"], "position": [place, -place], "effort": [place + 1, 2 - place]}
-        messages.append(json.dumps({"state": state}).encode())
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start()
-        kind = writer.register_schema("arm", "jsonschema", json.dumps(schema).encode())
-        channel = writer.register_channel("/state", "json", kind)
-        for place, content in enumerate(messages):
-            writer.add_message(channel, place * 10**7, content, place * 10**7)
-        writer.finish()  # type: ignore[no-untyped-call]
+        rows.append((place * 10**7, json.dumps({"state": state})))
+    path = json_mcap(tmp_path, rows, ("arm", "jsonschema", json.dumps(schema).encode()))
     log = read_log(path)
     assert log.tau[0] == pytest.approx(1e-3 * np.arange(1, 21))
     assert log.origin.reading.channels["tau2"].unit == "mN m"

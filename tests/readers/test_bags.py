@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer
 
@@ -20,7 +19,7 @@ from algid.readers import read_log
 from algid.readers.bags import open_messages
 from tests.readers.large import write_db3
 from tests.readers.logs import EPOCH_NS, noise_log, same
-from tests.readers.ways import STORES, Message, States, bag1, sent, written
+from tests.readers.ways import Message, States, bag1, sent, written
 
 LOG = noise_log(200, start_ns=EPOCH_NS)
 PLACES = ("theta1", "theta2", "tau1", "tau2")
@@ -102,31 +101,6 @@ def state(row: int, **changes: Any) -> Message:
     """One a millisecond of two joints, the outer one first."""
     pair = Message((1, 2), (10, 20), 5 * 10**9 + row * 1_000_000, 10**9 + row, ("b", "a"))
     return replace(pair, **changes)
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        (
-            {"effort": []},
-            r"found '/joint_states' with .*position\[b\], position\[a\], .*effort \(empty\); name",
-        ),
-        (
-            {"position": [1]},
-            "no topic holds theta1, theta2, tau1, tau2 of two joints; found '/joint_states' with",
-        ),
-        (
-            {"name": ["x", "y", "z"], "position": [1, 2, 3], "effort": [1, 2, 3]},
-            r"'/joint_states': 'position' stands there for 3 joints: .*/z; choose two: --joints A",
-        ),
-    ],
-)
-def test_joint_states_that_do_not_fit_are_told(
-    changes: dict[str, Any], words: str, tmp_path: Path
-) -> None:
-    path = bag(tmp_path, *(state(row, **changes) for row in range(3)))
-    with pytest.raises(LogError, match=words):
-        read_log(path)
 
 
 def test_a_field_needs_a_topic_and_a_topic_its_field(tmp_path: Path) -> None:
@@ -263,28 +237,3 @@ def test_a_database_that_is_no_bag_is_refused(
     with pytest.raises(LogError, match=told) as refused:
         read_log(changed(tmp_path, *statements))
     assert "\n" not in str(refused.value)
-
-
-def test_a_type_whose_definition_the_file_lacks(tmp_path: Path) -> None:
-    """Files of older rosbag2 hold no definitions: the usual types are those of the rosbags
-    package.
-    """
-    kind = "std_msgs/msg/Float64MultiArray"
-    file = changed(
-        tmp_path,
-        "DELETE FROM message_definitions",
-        "DELETE FROM messages",
-        f"INSERT INTO topics VALUES (2, '/arm', '{kind}', 'cdr', '', '')",
-    )
-    store = STORES[1]
-    layout = store.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
-    rows = []
-    for stamp, *values in zip(LOG.stamp_ns.tolist(), *LOG.theta, *LOG.tau, strict=True):
-        lists = store.types[kind](layout=layout, data=np.array(values))
-        rows.append((2, stamp, bytes(store.serialize_cdr(lists, kind))))
-    with closing(sqlite3.connect(file)) as base:
-        base.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", rows)
-        base.commit()
-    found = read_log(file, taken(*(f"data[{one}]" for one in range(4)), topic="/arm"))
-    assert np.array_equal(found.theta, LOG.theta)
-    assert np.array_equal(found.tau, LOG.tau)

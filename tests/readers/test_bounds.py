@@ -48,11 +48,8 @@ def parquet(folder: Path, **beside: object) -> Path:
 def test_a_long_name_of_a_column_is_passed_over(piece: str, tmp_path: Path) -> None:
     name = "q" + piece * 500_000
     assert len(read_log(parquet(tmp_path, **{name: [0.0] * 300, f"{name}x": [0.0] * 300}))) == 300
-    name = name[:60_000]
-    assert (
-        len(read_log(csv(tmp_path, f"{','.join(COLUMNS)},{name}", *(f"{row},0" for row in ROWS))))
-        == 300
-    )
+    header = f"{','.join(COLUMNS)},{name[:30_000]},9{name[2:30_000]}x"
+    assert len(read_log(csv(tmp_path, header, *(f"{row},0,0" for row in ROWS)))) == 300
 
 
 def test_a_name_beyond_the_bound_is_its_own_stem(limited: Limited) -> None:
@@ -60,14 +57,6 @@ def test_a_name_beyond_the_bound_is_its_own_stem(limited: Limited) -> None:
     limited(name_letters=6)
     assert take_apart("tau_01") == Name("tau", "1", None)
     assert take_apart("theta_1") == Name("theta_1", None, None)
-
-
-def test_a_cell_of_very_many_digits_is_no_number(tmp_path: Path) -> None:
-    name = "9" * 60_000 + "x"
-    assert (
-        len(read_log(csv(tmp_path, f"{','.join(COLUMNS)},{name}", *(f"{row},0" for row in ROWS))))
-        == 300
-    )
 
 
 def test_a_table_of_blanks_is_refused_at_its_row(tmp_path: Path) -> None:

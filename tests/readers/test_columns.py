@@ -42,26 +42,33 @@ def refused(columns: list[str], *more: Any) -> str:
     return str(error.value).removeprefix("log: ")
 
 
+QUANTITIES = ("theta", "tau", "omega", "q_des")
+
+
 @pytest.mark.parametrize("first", [0, 1], ids=["from zero", "from one"])
 @pytest.mark.parametrize(
-    ("angle", "torque"),
+    "forms",
     [
-        ("dof_pos_{}", "dof_torque_{}"),
-        ("dof_pos_{}", "tau_{}"),
-        ("actuator_{}_pos", "actuator_{}_torque"),
-        ("arm_pos_{}", "arm_tau_{}"),
-        ("pos_dof{}", "torque_dof{}"),
+        "dof_pos_{} dof_torque_{}",
+        "dof_pos_{} tau_{}",
+        "actuator_{}_pos actuator_{}_torque",
+        "arm_pos_{} arm_tau_{}",
+        "pos_dof{} torque_dof{}",
+        "state.q[{}] state.tau_J[{}] state.dq[{}] state.q_d[{}] state.tau_J_d[{}]",
+        "franka_state.q[{}] franka_state.tau_J[{}] franka_state.dq[{}]",
+        "motor_state[{}].q motor_state[{}].tau_est motor_state[{}].dq",
+        "low_state.motor_state[{}].q low_state.motor_state[{}].tau_est",
+        "/low_state/motor_state[{}]/q /low_state/motor_state[{}]/tau_est",
     ],
 )
-def test_two_of_numbered_joints_are_called_by_number_word_or_column(
-    angle: str, torque: str, first: int
-) -> None:
+def test_two_of_numbered_joints_are_called_by_number_word_or_column(forms: str, first: int) -> None:
     columns = ["t"]
     for number in range(first, first + 6):
-        columns += [angle.format(number), torque.format(number)]
+        columns += [form.format(number) for form in forms.split()]
+    angle = forms.split()[0]
     wanted = {
         f"{quantity}{place}": form.format(number)
-        for quantity, form in (("theta", angle), ("tau", torque))
+        for quantity, form in zip(QUANTITIES, forms.split(), strict=False)
         for place, number in ((1, first + 2), (2, first + 1))
     }
     for called in ("{}", angle):
@@ -132,42 +139,48 @@ def test_currents_are_in_amperes_unless_their_unit_is_told() -> None:
     assert units() == ["A", "A"]
     assert units(current_2="mA") == ["A", "mA"]
     assert units(current_2="Nm") == ["A", "A"]
-    told = assigned(header, {"tau1": {"unit": "N m"}, "tau2": CONSTANTS["tau2"]})
-    text = (
-        "the file states the unit A for tau1 ('current_1'), which is taken for N m, as configured"
-    )
-    assert said(told) == [("OTHER_UNIT", text)]
 
 
-def test_the_file_and_the_user_differ_about_a_unit() -> None:
-    assert said(
-        assigned(
-            "t q1_deg q2_deg tau1 tau2", {"theta1": {"unit": "rad"}, "theta2": {"unit": "deg"}}
-        )
-    ) == [
+@pytest.mark.parametrize(
+    ("header", "settings", "stated", "words"),
+    [
         (
-            "OTHER_UNIT",
-            (
-                "the file states the unit deg for theta1 ('q1_deg'), which is taken for rad, as "
-                "configured"
-            ),
-        )
-    ]
-    assert said(assigned("t q1_deg q2 tau1 tau2", None, q1_deg="rad", q2="deg")) == [
+            "t q1_deg q2_deg tau1 tau2",
+            {"theta1": {"unit": "rad"}, "theta2": {"unit": "deg"}},
+            {},
+            "deg for theta1 ('q1_deg'), which is taken for rad, as configured",
+        ),
         (
-            "OTHER_UNIT",
-            (
-                "the file states the unit rad for theta1 ('q1_deg'), which is taken for deg, as "
-                "its name says"
-            ),
-        )
-    ]
-    assert said(assigned("time_ms q1 q2 tau1 tau2", {"time_unit": "s"})) == [
+            "t q1_deg q2 tau1 tau2",
+            {},
+            {"q1_deg": "rad", "q2": "deg"},
+            "rad for theta1 ('q1_deg'), which is taken for deg, as its name says",
+        ),
         (
-            "OTHER_UNIT",
-            "the file states the unit ms for t ('time_ms'), which is taken for s, as configured",
-        )
-    ]
+            "time_ms q1 q2 tau1 tau2",
+            {"time_unit": "s"},
+            {},
+            "ms for t ('time_ms'), which is taken for s, as configured",
+        ),
+        (
+            "t q1_inch q2 tau1 tau2",
+            {"theta1": {"unit": "rev"}},
+            {},
+            "inch for theta1 ('q1_inch'), which is taken for rev, as configured",
+        ),
+        (
+            "t q1 q2 current_1 current_2",
+            {"tau1": {"unit": "N m"}, "tau2": CONSTANTS["tau2"]},
+            {},
+            "A for tau1 ('current_1'), which is taken for N m, as configured",
+        ),
+    ],
+)
+def test_the_file_and_the_user_differ_about_a_unit(
+    header: str, settings: dict[str, Any], stated: dict[str, str], words: str
+) -> None:
+    text = f"the file states the unit {words}"
+    assert said(assigned(header, settings, **stated)) == [("OTHER_UNIT", text)]
 
 
 def test_the_unit_in_the_name_of_a_column_that_a_user_names_is_used() -> None:
@@ -184,12 +197,6 @@ def test_a_unit_of_no_joint_is_refused_where_it_counts() -> None:
         "counts; say its unit if that is wrong: --set theta1.unit=rad"
     )
     assert "--set 'tau2.unit=\"N m\"'" in refusal(PLAIN, None, tau2="%")
-    (foreign,) = said(assigned("t q1_inch q2 tau1 tau2", {"theta1": {"unit": "rev"}}))
-    assert (
-        foreign[1]
-        == "the file states the unit inch for theta1 ('q1_inch'), which is taken for rev, as "
-        "configured"
-    )
     assert said(assigned("t q1_inch q2 q_b tau1 tau2", {"theta1": {"source": "q_b"}})) == []
     assert said(assigned(PLAIN, None, t="%")) == []
 
@@ -296,6 +303,7 @@ FIELD = {
     ),
     "time,q[0],q[1],tau_J[0],tau_J[1]": "time q[0] q[1] tau_J[0] tau_J[1]",
     "T,THETA1,Theta2,Tau1,TAU2": "T THETA1 Theta2 Tau1 TAU2",
+    "t,state.q[0],state.q[1],q1,q2,state.tau_J[0],state.tau_J[1],tau1,tau2": "t q1 q2 tau1 tau2",
     "Time [ms],Joint 1 Position [deg],Joint 2 Position [deg],Joint 1 Torque [Nm],Joint 2 Torque "
     "[Nm]": (
         "Time [ms],Joint 1 Position [deg],Joint 2 Position [deg],Joint 1 Torque [Nm],Joint 2 "

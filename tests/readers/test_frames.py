@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,6 @@ from algid.profile import Profile
 from algid.readers import open_log, read_log
 
 ROWS = 20_000
-LOOKED = 1 << 14
 """Samples that the message of other joints speaks of."""
 WRITERS: dict[str, Callable[[pl.DataFrame, Path], object]] = {
     "parquet": pl.DataFrame.write_parquet,
@@ -38,50 +36,12 @@ def arm(rows: int = ROWS, joints: int = 3) -> pl.DataFrame:
     )
 
 
-def other_joints(path: Path) -> list[str]:
-    reader = open_log(path, Profile(joints=("1", "2")))
-    return [notice.text for notice in reader.notices if notice.code == "OTHER_JOINTS"]
-
-
-@pytest.mark.parametrize(
-    "options", [{"row_group_size": 17_000}, {"data_page_size": 32_000, "write_batch_size": 4096}]
-)
-def test_other_joints_are_looked_at_in_the_first_samples_only(
-    options: dict[str, int], tmp_path: Path
-) -> None:
-    """A page of theirs that is damaged further on is not read for it; one among the first is."""
-    path, frame = tmp_path / "log.parquet", arm()
-    pq.write_table(
-        frame.to_arrow(),
-        path,
-        compression="none",
-        use_dictionary=False,
-        write_page_checksum=True,
-        **options,
-    )
-    whole = path.read_bytes()
-    for row, told in ((ROWS - 1, 1), (5000, 0)):
-        content = bytearray(whole)
-        content[content.index(struct.pack("<d", frame["q3"][row]))] ^= 1
-        path.write_bytes(content)
-        found = other_joints(path)
-        assert len(found) == told
-        assert all(f"3 by 0.8 rad (in the first {LOOKED:,} samples)" in text for text in found)
-        assert len(read_log(path, Profile(joints=("1", "2")))) == ROWS
-
-
-def test_whole_stamps_in_lists_stay_exact(tmp_path: Path) -> None:
+def test_whole_stamps_in_lists_stay_exact() -> None:
     """Past 2^53 a float64 would lose the last digits."""
     stamps = [1_700_000_000_123_456_789 + 1_000_001 * row for row in range(5)]
-    frame = {
-        "stamp_ns": pa.array([[stamp, 0] for stamp in stamps]),
-        "q": pa.array([[0.1, 0.2]] * 5),
-    }
-    table = pa.table({**frame, "tau": pa.array([[1.0, 2.0]] * 5)})
-    pq.write_table(table, tmp_path / "log.parquet")
-    log = read_log(tmp_path / "log.parquet", Profile(time="stamp_ns[0]", time_unit="ns"))
-    assert log.stamp_ns.tolist() == stamps
-    assert log.tau.tolist() == [[1] * 5, [2] * 5]
+    pairs = {"stamp_ns": [[stamp, 0] for stamp in stamps]}
+    table = pa.table(pairs | dict.fromkeys(("q", "tau"), [[1.0, 2.0]] * 5))
+    assert read_log(table, Profile(time="stamp_ns[0]")).stamp_ns.tolist() == stamps
 
 
 def test_more_columns_than_any_log_has_are_refused_in_every_format(tmp_path: Path) -> None:
@@ -135,16 +95,9 @@ def test_of_wide_lists_the_first_places_are_taken(tmp_path: Path) -> None:
 
 
 SHORT = 300
-ZEROS = pa.array([0] * SHORT, pa.int8())
-ONES = pa.array(np.ones(SHORT))
 REFUSED = {
     "union": pa.UnionArray.from_sparse(
         pa.array([0] * SHORT, pa.int8()), [pa.array(np.ones(SHORT))]
-    ),
-    "dense union": pa.UnionArray.from_dense(
-        pa.array([0] * SHORT, pa.int8()),
-        pa.array(range(SHORT), pa.int32()),
-        [pa.array(np.ones(SHORT))],
     ),
     "run-end encoded": pa.RunEndEncodedArray.from_arrays(
         pa.array([SHORT], pa.int32()), pa.array([1.0])
@@ -176,15 +129,6 @@ def test_a_type_that_holds_no_numbers_is_refused_where_it_is_needed_alone(
         read_log(feather(tmp_path / "log.feather", needed))
 
 
-def test_decimals_of_256_bits_are_read(tmp_path: Path) -> None:
-    table = arm(SHORT, 2).to_arrow()
-    exact = [Decimal(round(1000 * value)) / 1000 for value in table["q1"].to_pylist()]
-    decimals = table.drop(["q1"]).append_column("q1", pa.array(exact, pa.decimal256(60, 3)))
-    found = read_log(feather(tmp_path / "log.feather", decimals))
-    assert np.allclose(found.theta[0], table["q1"], atol=1e-3)
-
-
-@pytest.mark.parametrize("form", WRITERS)
 @pytest.mark.parametrize(
     "times",
     [
@@ -196,27 +140,16 @@ def test_decimals_of_256_bits_are_read(tmp_path: Path) -> None:
     ],
     ids=str,
 )
-def test_times_beyond_int64_nanoseconds_are_refused(
-    form: str, times: pa.Array, tmp_path: Path
-) -> None:
+def test_times_beyond_int64_nanoseconds_are_refused(times: pa.Array) -> None:
     table = arm(SHORT, 2).to_arrow().drop(["t"]).append_column("t", times)
-    path = tmp_path / "log"
-    if form == "parquet":
-        pq.write_table(table, path)
-    else:
-        feather(path, table)
     with pytest.raises(LogError, match="a time beyond 292 years in column 't'"):
-        read_log(path)
+        read_log(table)
 
 
-@pytest.mark.parametrize(
-    "options", [{"use_dictionary": False}, {"use_dictionary": True}, {"data_page_version": "2.0"}]
-)
-def test_checksums_of_parquet_pages_are_verified(options: dict[str, Any], tmp_path: Path) -> None:
+def test_checksums_of_parquet_pages_are_verified(tmp_path: Path) -> None:
     path, frame = tmp_path / "log.parquet", arm(2000, 2)
-    stored: dict[str, Any] = {"write_page_checksum": True, "compression": "none", **options}
+    stored: dict[str, Any] = {"write_page_checksum": True, "compression": "none"}
     pq.write_table(frame.to_arrow(), path, row_group_size=500, **stored)
-    assert len(read_log(path)) == 2000
     content = bytearray(path.read_bytes())
     content[content.index(struct.pack("<d", frame["q1"][1234]))] ^= 1
     path.write_bytes(content)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from algid.log import Log, Origin
+from algid.log import Log
 from algid.notices import Notice
 from pipelines import fuzz_files as fuzz
 from pipelines.hostile import FINE, corpus
@@ -22,42 +23,44 @@ def test_hostile_files_are_read_told_or_refused(seed: int, tmp_path: Path) -> No
     assert {kind for kind, _ in outcomes.values()} >= {"refused", "same"}
 
 
-def test_the_judge_sees_what_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
-    log = clean_log(20)
-
-    def judged(found: Log) -> str:
-        monkeypatch.setattr(fuzz, "read_log", lambda _: found)
-        return fuzz.outcome(Path("log.mcap"), log)[0]
-
-    lossy, other = Notice("CUT_OFF", "cut", lossy=True), Notice("GAPS", "gaps")
-    assert judged(log) == "same"
-    assert judged(log.part(0, 19)) == "silent"
-    assert judged(_noting(log.part(0, 19), other)) == "silent"
-    assert judged(_noting(log.part(0, 19), lossy)) == "told"
-    assert (
-        judged(Log(log.stamp_ns, log.theta + 1, log.tau, Origin("", "", {}), log.omega)) == "silent"
-    )
-
-    def fewest(found: Log, rows: int) -> str:
-        """The judgement on a file of which only the number of its samples is known."""
-        monkeypatch.setattr(fuzz, "read_log", lambda _: found)
-        return fuzz.outcome(Path("log.h5"), None, rows)[0]
-
-    assert fewest(log, 20) == "read"
-    assert fewest(log, 21) == fewest(_noting(log, other), 21) == "silent"
-    assert fewest(_noting(log, lossy), 21) == "read"
-    twice = Notice("UNEVEN_STAMPS", "1 sample repeats a stamp; the first of each was kept")
-    assert [fewest(_noting(log, twice), rows) for rows in (21, 22)] == ["read", "silent"]
-
-    def fails(_: Path) -> Log:
-        raise RuntimeError
-
-    monkeypatch.setattr(fuzz, "read_log", fails)
-    assert fuzz.outcome(Path("log.mcap"), log)[0] == "traceback"
+CLEAN = clean_log(20)
+SHORT = CLEAN.part(0, 19)
+LOSSY, OTHER = Notice("CUT_OFF", "cut", lossy=True), Notice("GAPS", "gaps")
+TWICE = Notice("UNEVEN_STAMPS", "1 sample repeats a stamp; the first of each was kept")
 
 
 def _noting(log: Log, notice: Notice) -> Log:
-    return Log(log.stamp_ns, log.theta, log.tau, log.origin, log.omega, (notice,))
+    return replace(log, notices=(notice,))
+
+
+@pytest.mark.parametrize(
+    ("found", "rows", "end"),
+    [
+        (CLEAN, 0, "same"),
+        (SHORT, 0, "silent"),
+        (_noting(SHORT, OTHER), 0, "silent"),
+        (_noting(SHORT, LOSSY), 0, "told"),
+        (replace(CLEAN, theta=CLEAN.theta + 1), 0, "silent"),
+        # of a file of which only the number of its samples is known
+        (CLEAN, 20, "read"),
+        (CLEAN, 21, "silent"),
+        (_noting(CLEAN, OTHER), 21, "silent"),
+        (_noting(CLEAN, LOSSY), 21, "read"),
+        (_noting(CLEAN, TWICE), 21, "read"),
+        (_noting(CLEAN, TWICE), 22, "silent"),
+        (None, 0, "traceback"),
+    ],
+)
+def test_the_judge_sees_what_is_silent(
+    found: Log | None, rows: int, end: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def read(_: Path) -> Log:
+        if found is None:
+            raise RuntimeError
+        return found
+
+    monkeypatch.setattr(fuzz, "read_log", read)
+    assert fuzz.outcome(Path("log.h5"), None if rows else CLEAN, rows)[0] == end
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(1000, marks=pytest.mark.slow)])

@@ -16,7 +16,8 @@ from algid.profile import Profile, with_settings
 from algid.readers import read_log
 from algid.readers.joints import moving_joints
 from algid.readers.table import SampleTable
-from tests.readers.ways import EPOCH, Message, States, written
+from tests.readers.logs import noise_log
+from tests.readers.ways import EPOCH, Message, States, sent, written
 
 IN_ORDER = """
 shoulder elbow, joint1 joint2, joint_9 joint_10, J1 j2, arm_1_joint arm_2_joint,
@@ -87,12 +88,10 @@ def test_everything_a_reader_was_told_is_in_the_origin(tmp_path: Path) -> None:
         "zero": "hanging",
         "time": "ms",
         "time_unit": "ms",
+        "offsets": [0.5, 0],
         "tau1": {"unit": "mN m", "sign": -1},
     }
-    profile = with_settings(
-        Profile.model_validate(settings), {"tau2": {"unit": "Nm"}, "offsets": [0.5, 0]}
-    )
-    log = read_log(tmp_path / "log.csv", profile)
+    log = read_log(tmp_path / "log.csv", with_settings(Profile(), settings))
     reading = log.origin.reading
     assert (reading.zero, reading.second_angle, reading.time_unit, reading.clock) == (
         "hanging",
@@ -100,20 +99,12 @@ def test_everything_a_reader_was_told_is_in_the_origin(tmp_path: Path) -> None:
         "ms",
         "column",
     )
-    assert [reading.channels[name].unit for name in ("theta1", "tau1", "tau2")] == [
-        "deg",
-        "mN m",
-        "N m",
-    ]
-    assert [reading.channels[name].told for name in ("theta1", "tau1", "tau2")] == [
-        "names",
-        "profile",
-        "profile",
-    ]
-    assert [reading.channels[name].sign for name in ("tau1", "tau2")] == [-1, 1]
-    for name, row, value in (("theta1", log.theta[0] + np.pi / 2, 10), ("tau1", log.tau[0], 30)):
-        channel = reading.channels[name]
-        assert np.allclose(row, channel.factor * value + channel.offset, rtol=1e-14)
+    told = {name: (one.unit, one.told, one.sign) for name, one in reading.channels.items()}
+    assert told["theta1"] == ("deg", "names", 1)
+    assert (told["tau1"], told["tau2"]) == (("mN m", "profile", -1), ("N m", "assumed", 1))
+    angle, torque = reading.channels["theta1"], reading.channels["tau1"]
+    assert np.allclose(log.theta[0] + np.pi / 2, 10 * angle.factor + angle.offset, rtol=1e-14)
+    assert np.allclose(log.tau[0], 30 * torque.factor, rtol=1e-14)
 
 
 def moving(unit: float = 1.0, rows: int = 3, **travel: float) -> str | None:
@@ -155,30 +146,32 @@ def test_the_four_that_move_furthest_are_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("position", "effort", "names"),
-    [
-        ("q{}_deg", "tau{}", ("1", "2", "3", "4")),
-        *(
-            (position, effort, ("base", "shoulder", "elbow", "wrist"))
-            for position, effort in (
-                ("/joint_states/{}/position", "/joint_states/{}/effort"),
-                ("{}_pos", "{}_torque"),
-            )
-        ),
-    ],
+    "form", ["q{}_deg tau{}", "/js/{}/position /js/{}/effort", "{}_pos {}_torque"]
 )
 def test_other_joints_of_a_table_that_move_are_told_by_their_names(
-    position: str, effort: str, names: tuple[str, ...], tmp_path: Path
+    form: str, tmp_path: Path
 ) -> None:
     """The first is held, the last turns through 0.6 rad; the two between are those to read."""
+    names = list("1234") if "deg" in form else ["base", "shoulder", "elbow", "wrist"]
     t = np.arange(400) * 0.01
     swing = np.sin(2 * t)
-    angles = np.stack([np.full(t.size, 0.7), swing, np.cos(3 * t), 0.3 * swing])
     columns = {"time": t, "/joint_commands/gripper/position": swing}  # no joint of this topic
-    degrees = 180 / np.pi if "deg" in position else 1.0
-    for form, rows in ((position, angles * degrees), (effort, 0.1 * angles)):
-        columns |= {form.format(name): row for name, row in zip(names, rows, strict=True)}
+    for name, angle in zip(names, (0.7 + 0 * t, swing, np.cos(3 * t), 0.3 * swing), strict=True):
+        for own, values in zip(form.split(), (angle, 0.1 * angle), strict=True):
+            columns[own.format(name)] = np.degrees(values) if "deg" in own else values
     pl.DataFrame(columns).write_csv(tmp_path / "log.csv")
     log = read_log(tmp_path / "log.csv", Profile(joints=(names[1], names[2])))
     (text,) = (one.text for one in log.notices if one.code == "OTHER_JOINTS")
     assert f"1 other joint moves meanwhile: {names[3]} by 0.6 rad" in text
+
+
+def test_of_two_topics_with_both_joints_it_is_said_which_was_taken(tmp_path: Path) -> None:
+    log = noise_log(80)
+    path = written("cdr", tmp_path, States(sent(log) + sent(log, topic="/arm/state")))
+    (notice,) = read_log(path).notices
+    assert (notice.code, notice.note) == ("JOINT_ORDER", True)
+    assert (
+        notice.text == "the joints are taken from '/joint_states'; there are two also on /arm/state"
+    )
+    assert [remedy.settings for remedy in notice.remedies] == [{"topic": "/arm/state"}]
+    assert told(read_log(path, Profile(topic="/arm/state"))) == []

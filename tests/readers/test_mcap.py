@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from algid.base.errors import LogError
+from algid.inspection.checks import inspect_log
 from algid.profile import Profile
 from algid.readers import read_log
 from tests.readers.logs import EPOCH_NS, noise_log, same
-from tests.readers.mcaps import messages_of, write_mcap
+from tests.readers.mcaps import ANY, messages_of, write_mcap
 from tests.readers.ways import Message, States, sent, written
 
 LOG = noise_log(400, start_ns=EPOCH_NS, velocity=False)
@@ -28,23 +31,16 @@ def test_messages_that_lack_a_quantity_are_lost_and_those_of_other_joints_are_no
     lacking: str, encoding: str, tmp_path: Path
 ) -> None:
     messages = sent(LOG.part(0, 90))
+    without: dict[str, Any] = {lacking: ()}
     for row in range(0, 90, 3):
-        without: dict[str, Any] = {lacking: ()}
         messages[row + 1] = replace(messages[row + 1], **without)
-        one = messages[row + 2]
-        messages[row + 2] = replace(
-            one, name=["other"], position=one.position[:1], effort=one.effort[:1]
-        )
+        messages[row + 2] = replace(messages[row + 2], name=["x"], position=[1], effort=[2])
     found = read_log(mcap(tmp_path, messages, encoding))
     assert found.stamp_ns.tolist() == LOG.stamp_ns[:90:3].tolist()
-    told = {notice.case: (notice.lossy, notice.text) for notice in found.notices}
-    fields = f"{lacking}[j1], {lacking}[j2]"
-    assert told == {
-        "fields": (
-            True,
-            f"30 messages on '/joint_states' left out for want of {fields}",
-        ),
-        "joints": (False, "30 messages on '/joint_states' left out: of other joints"),
+    left = "30 messages on '/joint_states' left out"
+    assert {(one.case, one.lossy, one.text) for one in found.notices} == {
+        ("fields", True, f"{left} for want of {lacking}[j1], {lacking}[j2]"),
+        ("joints", False, f"{left}: of other joints"),
     }
 
 
@@ -71,3 +67,16 @@ def test_xcdr2_is_refused(tmp_path: Path) -> None:
     write_mcap(tmp_path / "log.mcap", messages)
     with pytest.raises(LogError, match="XCDR2"):
         read_log(tmp_path / "log.mcap")
+
+
+def test_a_torque_beside_one_of_zeros_is_taken_by_its_topic_and_field(tmp_path: Path) -> None:
+    path, messages = tmp_path / "log.mcap", messages_of(replace(LOG, tau=0 * LOG.tau))
+    for stamp, torque in zip(LOG.stamp_ns.tolist(), LOG.tau[0].tolist(), strict=True):
+        wrench = {"wrench": {"force": {"z": 1.0}, "torque": {"z": torque}}}
+        messages.append(("/ft", stamp, json.dumps(wrench).encode()))
+    write_mcap(path, messages, {"/ft": ANY})
+    found = inspect_log(path).findings
+    zeros = [one.remedies[0].settings for one in found if one.code == "EFFORT_ZERO"]
+    assert zeros == [{"tau1.source": None}, {"tau2.source": None}]
+    named = {"tau1": {"topic": "/ft", "source": "wrench.torque.z"}}
+    assert np.array_equal(read_log(path, Profile.model_validate(named)).tau[0], LOG.tau[0])

@@ -8,54 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from algid.arm import FloatArray
-from algid.base.ros2 import HEADER
 from algid.log import Log, Origin
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
-from tests.readers.mcaps import Cdr, messages_of, write_mcap
+from tests.readers.mcaps import messages_of, write_mcap
 
 T = 0.01 * np.arange(300)
 THETA = np.stack([np.sin(T), np.cos(2 * T)])
 TAU = np.stack([np.cos(T), np.sin(T)])
 REFERENCE = THETA + 0.1
-POINT = """\
-float64[] positions
-float64[] velocities
-float64[] accelerations
-float64[] effort
-builtin_interfaces/Duration time_from_start
-"""
-LINE = 80 * "="
-
-
-def state_definition(field: str) -> bytes:
-    """The controller's state, with what it follows in `field`."""
-    return f"""\
-std_msgs/Header header
-string[] joint_names
-trajectory_msgs/JointTrajectoryPoint {field}
-{LINE}
-MSG: trajectory_msgs/JointTrajectoryPoint
-{POINT}{LINE}
-MSG: builtin_interfaces/Duration
-int32 sec
-uint32 nanosec
-{HEADER}""".encode()
-
-
-def controller_state(stamp_ns: int, names: list[str], positions: list[float]) -> bytes:
-    message = Cdr().put("i", stamp_ns // 10**9).put("I", stamp_ns % 10**9).text("")
-    message.put("I", len(names))
-    for name in names:
-        message.text(name)
-    message.list("d", positions)
-    for _ in ("velocities", "accelerations", "effort"):
-        message.put("I", 0)
-    return message.put("i", 0).put("I", 0).done()
-
-
 Columns = dict[str, FloatArray]
 
 
@@ -71,14 +35,10 @@ def read(columns: Columns, **settings: Any) -> Log:
     return read_log(columns, with_settings(Profile(), settings))
 
 
-def reference(log: Log) -> FloatArray:
-    return log.reference
-
-
 @pytest.mark.parametrize("names", ["q_des1,q_des2", "q_ref1,q_ref2", "target_q_0,target_q_1"])
 def test_columns_are_found_by_their_names(names: str) -> None:
     found = read(PLAIN | columns(names, REFERENCE))
-    assert np.array_equal(reference(found), REFERENCE)
+    assert np.array_equal(found.reference, REFERENCE)
     assert np.array_equal(found.theta, THETA)  # a commanded angle is none
 
 
@@ -94,10 +54,10 @@ def test_a_profile_names_them_and_they_are_recorded_as_the_angles_are() -> None:
         "second_angle": "absolute",
         "zero": "hanging",
     }
-    found = reference(read(made, **settings))
+    found = read(made, **settings).reference
     assert found == pytest.approx(REFERENCE - np.array([[math.pi / 2], [0.0]]))
     settings["q_des1"] = {"source": "one", "unit": "rad"}
-    assert reference(read(made, **settings))[0] == pytest.approx(asked[0] - math.pi / 2)
+    assert read(made, **settings).reference[0] == pytest.approx(asked[0] - math.pi / 2)
 
 
 @pytest.mark.parametrize(
@@ -131,31 +91,37 @@ def test_one_that_wraps_follows_its_angle() -> None:
     turning, asked = (np.stack([3 * T + part, THETA[1]]) for part in (0.0, 0.1))
     names = "t,theta1,theta2,tau1,tau2,q_des1,q_des2"
     made = columns(names, T, np.mod(turning, 2 * np.pi), TAU, np.mod(asked, 2 * np.pi))
-    found = reference(read(made, theta1={"unwrap": True}))
+    found = read(made, theta1={"unwrap": True}).reference
     assert found[0] == pytest.approx(turning[0] + 0.1)
 
 
 @pytest.mark.parametrize("field", ["reference", "desired"])
 def test_a_trajectory_controller_tells_it(field: str, tmp_path: Path) -> None:
     """At a rate of its own and for a part of the log; joints in another order; nothing is lost."""
+    kind, topic = "control_msgs/msg/JointTrajectoryControllerState", "/arm_controller/state"
+    point = "trajectory_msgs/msg/JointTrajectoryPoint"
+    text = f"std_msgs/Header header\nstring[] joint_names\n{point} {field}\n"
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    types.register(get_types_from_msg(text, kind))
     log = Log(10**9 + np.arange(300) * 10_000_000, THETA, TAU, Origin("", "", {}))
     messages = messages_of(log, names=["hip", "knee"])
-    for step, (t, stamp) in enumerate(zip(T, log.stamp_ns.tolist(), strict=True)):
-        if step % 4 == 0 and 40 <= step <= 200:
-            asked = [float(REFERENCE[1, step]), t, float(REFERENCE[0, step])]
-            data = controller_state(stamp, ["knee", "wrist", "hip"], asked)
-            messages.append(("/arm_controller/state", stamp, data))
-    kind = "control_msgs/msg/JointTrajectoryControllerState"
-    schemas = {"/arm_controller/state": (kind, "ros2msg", state_definition(field))}
+    time, span = (types.types[f"builtin_interfaces/msg/{name}"] for name in ("Time", "Duration"))
+    none = np.empty(0)
+    for step in range(40, 201, 4):
+        asked = np.array([REFERENCE[1, step], T[step], REFERENCE[0, step]])
+        wanted = types.types[point](asked, none, none, none, span(0, 0))
+        stamp = time(*divmod(int(log.stamp_ns[step]), 10**9))
+        head = types.types["std_msgs/msg/Header"](stamp, "")
+        state = types.types[kind](head, ["knee", "wrist", "hip"], wanted)
+        data = bytes(types.serialize_cdr(state, kind))
+        messages.append((topic, int(log.stamp_ns[step]), data))
+    definition, _ = types.generate_msgdef(kind, ros_version=2)
     messages.sort(key=lambda one: one[1])
-    write_mcap(tmp_path / "log.mcap", messages, schemas)
+    write_mcap(tmp_path / "log.mcap", messages, {topic: (kind, "ros2msg", definition.encode())})
     found = read_log(tmp_path / "log.mcap")
     assert len(found) == len(T)
-    asked_for = reference(found)
-    inside = slice(40, 201)
     # linear interpolation over 40 ms of cos 2t: at most 4 × 0.04² / 8
-    assert np.abs(asked_for[:, inside] - REFERENCE[:, inside]).max() < 8.1e-4
-    assert np.all(np.isnan(asked_for[:, :40]))
-    assert np.all(np.isnan(asked_for[:, 201:]))
+    assert np.abs(found.reference[:, 40:201] - REFERENCE[:, 40:201]).max() < 8.1e-4
+    assert np.isnan(np.delete(found.reference, np.s_[40:201], axis=1)).all()
     assert not any(notice.lossy for notice in found.notices)
-    assert found.origin.mapping["q_des1"] == f"/arm_controller/state: {field}.positions[2]"
+    assert found.origin.mapping["q_des1"] == f"{topic}: {field}.positions[2]"

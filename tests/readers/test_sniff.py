@@ -14,7 +14,7 @@ from algid.api.guide import text_of
 from algid.base.errors import LogError
 from algid.readers import read_log
 from algid.readers.dialect import Dialect, detect, looks_like_text
-from algid.readers.formats import FORMATS, SUFFIXES, format_of
+from algid.readers.formats import FORMATS, format_of
 
 CONTENT = {
     "mcap": b"\x89MCAP0\r\n...", "parquet": b"PAR1...", "bag": b"#ROSBAG V2.0\n",
@@ -132,13 +132,6 @@ def test_a_row_of_units_and_comments_above_and_below_it() -> None:
     assert (dialect.schema.field("q1").metadata, dialect.skip) == ({b"unit": b"rad"}, 4)
     assert dialect.schema.field("tau1").metadata is None
     assert dialect.said == ("tau1 in mNm", " q1 in deg")
-
-
-def test_each_format_is_one_entry() -> None:
-    names = [form.name for form in FORMATS]
-    assert len(set(names)) == len(names)
-    assert len(set(SUFFIXES)) == len(SUFFIXES)
-    assert set(names) >= {*CONTENT, "npz", "rosbag2"}
 
 
 def test_the_guide_lists_every_format() -> None:
