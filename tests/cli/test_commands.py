@@ -5,11 +5,8 @@ from __future__ import annotations
 import json
 import math
 import re
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 import pytest
@@ -82,24 +79,6 @@ def test_a_failed_result_ends_with_three_and_says_what_to_run(logs: Path, tmp_pa
     assert " OK " not in found.out
 
 
-def test_identify_says_where_it_wrote_and_takes_a_name(logs: Path, tmp_path: Path) -> None:
-    call = (
-        "identify",
-        logs / "case1-unloaded.csv",
-        "-o",
-        tmp_path,
-        "--name",
-        "monday",
-        "--no-report",
-    )
-    found = Outcome(*call, "--estimator", "weak")
-    assert found.code == 0, found.err
-    *notes, last = found.err.splitlines()
-    assert last == f"wrote {tmp_path / 'monday.algid'}"
-    assert all(note.startswith("note: ") for note in notes)
-    assert (tmp_path / "monday.algid" / "result.json").exists()
-
-
 def test_how_a_log_was_read_is_reused_and_compared(logs: Path, tmp_path: Path) -> None:
     """θ1 of the log counts from hanging: said once, for the arm.
 
@@ -111,111 +90,55 @@ def test_how_a_log_was_read_is_reused_and_compared(logs: Path, tmp_path: Path) -
     }
     for role, table in hanging.items():
         table.drop("omega1", "omega2").write_csv(tmp_path / f"{role}.csv")
-    quick = (
-        "-o",
-        tmp_path,
-        "--estimator",
-        "weak",
-        "--model",
-        "plain",
-        "--no-report",
-        "--format",
-        "json",
-    )
-    arm = Outcome("identify", tmp_path / "unloaded.csv", *quick, "--zero", "hanging")
-    assert arm.code == 0, arm.err
-    content = json.loads(arm.out)
+
+    def identified(*arguments: object) -> Any:
+        quick = ["--estimator", "weak", "--model", "plain", "--no-report", "--format", "json"]
+        done = Outcome("identify", *map(str, arguments), "-o", tmp_path, *quick)
+        assert done.code in (0, 3), done.err
+        return json.loads(done.out)
+
+    unloaded, loaded, arm = (tmp_path / f for f in ("unloaded.csv", "loaded.csv", "unloaded.algid"))
+    content = identified(unloaded, "--zero", "hanging")
     assert content["profile"] == {"zero": "hanging"}
     assert content["log"]["reading"]["zero"] == "hanging"
-    known = ("--parameters", tmp_path / "unloaded.algid")
-    alike = Outcome("identify", *known, tmp_path / "loaded.csv", *quick)
-    assert json.loads(alike.out)["log"]["reading"]["zero"] == "hanging"
-    assert json.loads(alike.out)["payload"]["m_p"]["estimate"] == pytest.approx(0.3515, rel=0.02)
-    other = Outcome(
-        "identify",
-        *known,
-        tmp_path / "loaded.csv",
-        *quick,
-        "--zero",
-        "horizontal",
-        "--name",
-        "other",
-    )
-    (warning,) = [
-        one["text"] for one in json.loads(other.out)["notices"] if one["code"] == "OTHER_ARM"
-    ]
+    alike = identified("--parameters", arm, loaded)
+    assert alike["log"]["reading"]["zero"] == "hanging"
+    assert alike["payload"]["m_p"]["estimate"] == pytest.approx(0.3515, rel=0.02)
+    flat = ("--zero", "horizontal")
+    other = identified("--parameters", arm, loaded, *flat, "--name", "other")
+    (warning,) = [one["text"] for one in other["notices"] if one["code"] == "OTHER_ARM"]
     assert "zero horizontal instead of hanging" in warning
-    good = Outcome("validate", tmp_path / "unloaded.algid", tmp_path / "unloaded.csv")
+    good, wrong = (Outcome("validate", arm, unloaded, *more) for more in ((), flat))
     scores = re.findall(r"^all logs +\d +\S+ +\S+ +(\S+)", good.out, re.MULTILINE)
     assert min(map(float, scores)) > 0.999
     assert good.err == ""
-    wrong = Outcome(
-        "validate", tmp_path / "unloaded.algid", tmp_path / "unloaded.csv", "--zero", "horizontal"
-    )
     assert "zero horizontal instead of hanging" in wrong.err
-    compared = Outcome(
-        "compare", tmp_path / "loaded.algid", tmp_path / "other.algid", "--format", "json"
-    )
-    assert json.loads(compared.out)["settings"]["loaded log.zero"] == ["hanging", "horizontal"]
+    pair = (tmp_path / "loaded.algid", tmp_path / "other.algid")
+    compared = json.loads(Outcome("compare", *pair, "--format", "json").out)
+    assert compared["settings"]["loaded log.zero"] == ["hanging", "horizontal"]
 
 
 def test_validate_predicts_another_log(tmp_path: Path) -> None:
-    for seed, name in enumerate(("one", "two")):
-        Outcome(
-            "synth", "case1", "-o", tmp_path / name, "--torque", "wide", "--duration", "4",
-            "--seed", str(seed), "--position-noise", "1e-4", "--torque-noise", "1e-2",
-        )  # fmt: skip
-    logs = [
-        [tmp_path / name / f"case1-{role}.mcap" for role in ("unloaded", "loaded")]
-        for name in ("one", "two")
+    noisy = [
+        "--torque",
+        "wide",
+        "--duration",
+        "4",
+        "--position-noise",
+        "1e-4",
+        "--torque-noise",
+        "1e-2",
     ]
-    Outcome(
-        "identify",
-        logs[0][0],
-        "--loaded",
-        logs[0][1],
-        "-o",
-        tmp_path,
-        "--no-report",
-        "--model",
-        "plain",
-    )
+    logs = []
+    for seed in "01":
+        folder = tmp_path / seed
+        Outcome("synth", "case1", "-o", folder, "--seed", seed, *noisy)
+        logs.append((folder / "case1-unloaded.mcap", "--loaded", folder / "case1-loaded.mcap"))
+    Outcome("identify", *logs[0], "-o", tmp_path, "--no-report", "--model", "plain")
     folder = tmp_path / "case1-unloaded.algid"
-    good = Outcome("validate", folder, logs[1][0], "--loaded", logs[1][1], "--max-nrmse", "0.3")
+    good = Outcome("validate", folder, *logs[1], "--max-nrmse", "0.3")
     assert good.code == 0, good.err + good.out
     lines = [line.split() for line in good.out.splitlines() if line.startswith("all logs")]
     assert [words[2] for words in lines] == ["1", "2"]
     assert "Filter: zero-phase Butterworth" in good.out
     assert Outcome("validate", folder, logs[1][0], "--max-nrmse", "1e-9").code == 1
-
-
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
-def test_a_stop_gets_one_line_and_leaves_nothing_half_written(
-    sent: signal.Signals, logs: Path, tmp_path: Path
-) -> None:
-    long = pl.concat([pl.read_csv(logs / "case1-unloaded.csv")] * 400)
-    long = long.with_columns(t=pl.int_range(pl.len()) * 1e-3)
-    long.write_csv(tmp_path / "long.csv")
-    out = tmp_path / "out"
-    command = [
-        sys.executable,
-        "-m",
-        "algid",
-        "identify",
-        str(tmp_path / "long.csv"),
-        "-o",
-        str(out),
-    ]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as running:
-        while not (out.exists() and list(out.iterdir())) and running.poll() is None:
-            time.sleep(0.01)
-        running.send_signal(sent)
-        printed, told = running.communicate()
-    assert (running.returncode, printed, told) == (
-        128 + sent,
-        "",
-        "algid: stopped; nothing half-written is left\n",
-    )
-    assert list(out.iterdir()) == []

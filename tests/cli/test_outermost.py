@@ -196,7 +196,6 @@ def test_a_tampered_result_drives_no_terminal(result: Path, tmp_path: Path) -> N
         ("compare", folder, result, "--format", "json"),
         ("report", folder),
         ("report", folder, "--format", "json"),
-        ("report", folder, "--format", "json"),
         ("export", folder, "--to", "c"),
         ("validate", folder, result.parent / "case1-unloaded.mcap"),
     ):

@@ -13,13 +13,11 @@ from shutil import copytree
 
 import click
 import pytest
-from click.testing import CliRunner
 
-from algid.base.errors import AlgidError
 from algid.base.files import read_whole
 from algid.base.limits import LIMITS
 from algid.cli.app import COMMANDS, command
-from tests.cli.commands import app
+from tests.cli.commands import call
 
 WRITTEN = {"out", "scratch", "write_profile"}
 """Options that name what is written, not what is read."""
@@ -41,97 +39,74 @@ def soon(seconds: float = 60.0) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
+LOG, RESULT = "case1-unloaded.mcap", "case1-unloaded.algid"
+CALLS = {
+    "batch": f"{LOG} -o batch",
+    "convert": f"{LOG} -o out.csv",
+    "design": f"{RESULT} -o design",
+    "identify": f"{LOG} -o again",
+    "inspect": LOG,
+    "synth": "case1 -o synth --duration 2",
+    "track": f"{LOG} -o track --parameters {RESULT}",
+    "validate": f"{RESULT} {LOG}",
+}
+ARGUMENTS = """
+design pipe.toml --range 1 --speed 3 --torque 2
+synth pipe.toml -o synth
+synth case1 --motion piped -o synth
+identify pipe
+validate pipe.urdf case1-unloaded.mcap
+validate pipe case1-unloaded.mcap
+export pipe --to c
+batch pipe.toml -o batch
+track pipe --parameters case1-unloaded.algid
+validate pipe.json --max-error 1
+report pipe.json
+compare pipe case1-unloaded.algid
+convert pipe -o out.csv
+inspect pipe
+"""
+
+
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def place(result: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A log, its result, and pipes of every suffix."""
     folder = tmp_path_factory.mktemp("pipes")
-    run = CliRunner().invoke
-    made = ["synth", "case1", "-o", str(folder), "--duration", "2", "--torque", "wide"]
-    assert run(app, made).exit_code == 0
-    log = str(folder / "case1-unloaded.mcap")
-    assert run(app, ["identify", log, "-o", str(folder), "--no-report", "-q"]).exit_code == 0
-    for name in ("pipe", "pipe.toml", "pipe.csv", "pipe.urdf", "pipe.json"):
+    for made in (LOG, RESULT):
+        (folder / made).symlink_to(result.with_name(made))
+    (folder / "piped").mkdir()
+    inside = ("piped/result.json", "piped/jobs.parquet", "piped/trajectory.csv")
+    for name in ("pipe", "pipe.toml", "pipe.csv", "pipe.urdf", "pipe.json", *inside):
         os.mkfifo(folder / name)
     return folder
 
 
-def _files() -> list[tuple[str, str]]:
-    """Every option of every command that names a file or a folder to read."""
-    return [
-        (name, option.opts[0])
-        for name in COMMANDS
-        for option in command(name).params
-        if isinstance(option, click.Option)
-        and isinstance(option.type, click.Path)
-        and option.name not in WRITTEN
-    ]
+def _calls() -> Iterator[str]:
+    """Every option of every command that names a file or a folder to read, and every argument."""
+    for name in COMMANDS:
+        for option in command(name).params:
+            reads = isinstance(option.type, click.Path) and option.name not in WRITTEN
+            if reads and isinstance(option, click.Option):
+                yield f"{name} {CALLS[name]} {option.opts[0]} pipe"
+    yield from ARGUMENTS.strip().splitlines()
 
 
-@pytest.mark.parametrize(("command", "option"), _files())
-def test_an_option_that_names_a_pipe_is_refused(command: str, option: str, place: Path) -> None:
-    log, result = str(place / "case1-unloaded.mcap"), str(place / "case1-unloaded.algid")
-    arguments = {
-        "batch": [log, "-o", str(place / "batch")],
-        "convert": [log, "-o", str(place / "out.csv")],
-        "design": [result, "-o", str(place / "design")],
-        "identify": [log, "-o", str(place / "again")],
-        "inspect": [log],
-        "synth": ["case1", "-o", str(place / "synth"), "--duration", "2"],
-        "track": [
-            log,
-            "-o",
-            str(place / "track"),
-            *([] if option == "--parameters" else ["--parameters", result]),
-        ],
-        "validate": [result, log],
-    }
-    refused([command, *arguments[command], option, str(place / "pipe")])
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["design", "pipe.toml", "--range", "1", "--speed", "3", "--torque", "2"],
-        ["synth", "pipe.toml", "-o", "synth"],
-        ["synth", "case1", "--motion", "piped", "-o", "synth"],
-        ["identify", "pipe"],
-        ["validate", "pipe.urdf", "case1-unloaded.mcap"],
-        ["validate", "pipe", "case1-unloaded.mcap"],
-        ["export", "pipe", "--to", "c"],
-        ["batch", "pipe.toml", "-o", "batch"],
-        ["track", "pipe", "--parameters", "case1-unloaded.algid"],
-        ["validate", "pipe.json", "--max-error", "1"],
-        ["report", "pipe.json"],
-        ["compare", "pipe", "case1-unloaded.algid"],
-        ["convert", "pipe", "-o", "out.csv"],
-        ["inspect", "pipe"],
-    ],
-    ids=" ".join,
-)
-def test_an_argument_that_names_a_pipe_is_refused(
-    arguments: list[str], place: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("words", [*_calls()])
+def test_what_names_a_pipe_is_refused_in_a_line(
+    words: str, place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(place)
-    Path("piped").mkdir(exist_ok=True)
-    for name in ("result.json", "jobs.parquet", "trajectory.csv"):
-        if not Path("piped", name).exists():
-            os.mkfifo(Path("piped", name))
-    refused(arguments)
-
-
-def refused(arguments: list[str]) -> None:
-    """Run a command that has to end with one line of its own."""
     with soon():
-        done = CliRunner().invoke(app, arguments)
-    text = str(done.exception) if isinstance(done.exception, AlgidError) else done.stderr.strip()
-    assert done.exit_code != 0
-    if arguments[0] == "batch" and "--torque-file" in arguments:
-        text = done.stdout.strip().splitlines()[-2]
-    if arguments[0] == "inspect" and "--torque-file" in arguments:
+        done = call(*words.split())
+    text = done.err.strip()
+    if "--torque-file" in words and words.startswith("batch"):
+        text = done.out.splitlines()[-2]
+    if "--torque-file" in words and words.startswith("inspect"):
         # its last words, in as many lines as the terminal needs
-        text = " ".join(done.stdout[done.stdout.rindex("refused: ") :].split())
-    assert len(text.splitlines()) == 1, (done.output, done.exception)
-    assert "no regular file" in text or (arguments[0] == "batch" and "found none" in text), text
+        text = " ".join(done.out[done.out.rindex("refused: ") :].split())
+    assert done.code != 0
+    assert len(text.splitlines()) == 1, done
+    assert "no regular file" in text or (words.startswith("batch") and "found none" in text), text
 
 
 def test_a_pipe_among_a_batchs_logs_fails_alone(
@@ -139,9 +114,9 @@ def test_a_pipe_among_a_batchs_logs_fails_alone(
 ) -> None:
     monkeypatch.chdir(place)
     with soon():
-        done = CliRunner().invoke(app, ["batch", "pipe.csv", "-o", "batch"])
-    assert done.exit_code == 1
-    assert "pipe: failed: pipe.csv: it is no regular file" in " ".join(done.output.split())
+        done = call("batch", "pipe.csv", "-o", "batch")
+    assert done.code == 1
+    assert "pipe: failed: pipe.csv: it is no regular file" in " ".join(done.out.split())
 
 
 @pytest.mark.parametrize("command", [["report"], ["report", "--export", "mcap"]], ids=" ".join)
@@ -154,7 +129,7 @@ def test_a_series_of_a_result_that_is_a_pipe_is_absent(
         series.unlink()
         os.mkfifo(series)
     with soon():
-        assert CliRunner().invoke(app, [*command, str(folder)]).exit_code == 0
+        assert call(*command, folder).code == 0
     assert (folder / "report.html").exists()
 
 

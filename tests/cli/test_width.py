@@ -14,7 +14,8 @@ from tests.processes import Outcome
 from tests.terminals import WIDTH, on_a_terminal
 
 HEIGHT = 25
-CONTROL = re.compile(r"\x1b\[([0-9;?]*)([A-Za-z])|(\r)|(\n)")
+CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|\r")
+ERASED = "\x1b[2K"
 RESULTS = ("identify", "validate", "track", "batch", "synth", "export", "convert")
 """What has a screen at most; a log's channels, tables of a report and comparisons may be many."""
 CALLS = [
@@ -52,25 +53,8 @@ def words(call: str, result: Path, short: Path, out: Path) -> list[str]:
 
 
 def left(printed: str) -> list[str]:
-    """What stays of the lines once a bar of progress has moved up and erased itself."""
-    lines, row, column, place = [""], 0, 0, 0
-    for one in [*CONTROL.finditer(printed), None]:
-        text = printed[place : one.start() if one else None]
-        lines[row] = lines[row][:column].ljust(column) + text + lines[row][column + len(text) :]
-        column += len(text)
-        if one is None:
-            break
-        place = one.end()
-        if one[4]:
-            row, column = row + 1, 0
-            lines += [""] * (row + 1 - len(lines))
-        elif one[3]:
-            column = 0
-        elif one[2] == "A":
-            row -= int(one[1] or 1)
-        elif one[2] == "K":
-            lines[row] = ""
-    return "\n".join(lines).rstrip().splitlines()
+    """The lines that stay once the last bar of progress has erased itself."""
+    return CONTROL.sub("", printed.rpartition(ERASED)[2]).rstrip().splitlines()
 
 
 @pytest.mark.parametrize("call", CALLS)
