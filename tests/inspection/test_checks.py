@@ -16,9 +16,6 @@ from algid.log import Log, Origin
 from algid.notices import Notice, codes_of, has_code
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.synth.excitation import wide_multi_sine
-from algid.synth.simulator import simulate
-from pipelines.accuracy_scenes import random_arm
 
 K = Arm(6, 3, 0.15, 0.1, 0.3, 0.2, 0.1, 0.02, 1.5, 0.3).constants()
 
@@ -124,28 +121,3 @@ def test_encoders_and_rest_make_no_lost_samples() -> None:
 def test_three_samples_are_not_looked_at() -> None:
     assert of_signals(spoiled("DEGREES").part(0, 3)) == ()
     assert of_signals(spoiled("DEGREES").part(0, 4)) != ()
-
-
-def test_a_refusal_names_what_overrides_it_and_yields_to_that() -> None:
-    log = spoiled("EFFORT_ZERO")
-    found = inspect_log(log)
-    (refused,) = found.findings
-    assert repr(found).startswith("Inspection('arm.csv', EFFORT_ZERO: tau2 is zero")
-    assert refused.advice.endswith("to use it nevertheless: --accept EFFORT_ZERO")
-    reading = replace(log.origin.reading, accepted=("EFFORT_ZERO",))
-    accepted = noticed(replace(log, origin=replace(log.origin, reading=reading)))[0]
-    assert accepted.text == "tau2 is zero in every sample (accepted by --accept)"
-
-
-def test_joints_that_turn_many_times_are_read_where_physics_holds_for_radians() -> None:
-    arm = random_arm(22)[0]
-    t = np.arange(10_001) * 1e-3
-    motion = simulate(arm.constants(), wide_multi_sine(arm, sum(b"arm22")), t)
-    assert np.abs(motion.theta).max() > 12 * np.pi
-    draw = np.random.default_rng(11)
-    theta, tau = (
-        values + 1e-3 * draw.standard_normal(values.shape) for values in (motion.theta, motion.tau)
-    )
-    log = Log(np.arange(t.size) * 1_000_000, theta, tau, Origin("arm.csv", "csv", {}))
-    assert codes(log) == []
-    assert codes(replace(log, theta=np.degrees(log.theta))) == ["DEGREES"]

@@ -25,8 +25,9 @@ from algid.readers import read_log
 from algid.readers.table import CHANNELS, JOINT_CHANNELS
 from tests.cli.commands import profile_from
 from tests.inspection.test_checks import K, moving_log, noticed
-from tests.readers.logs import EPOCH_NS
-from tests.readers.mcaps import ANY, joint_state, write_mcap
+from tests.readers.logs import EPOCH_NS, noise_log
+from tests.readers.mcaps import ANY, write_mcap
+from tests.readers.ways import States, sent, written
 
 
 def test_conventions_are_judged_over_all_stretches() -> None:
@@ -219,36 +220,27 @@ NAMES = ("q\U0001f600", 'say "hi"', "back\\slash", "bell\x7f", "θ₁ rad")
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_flag_takes_a_column_whatever_it_is_called(name: str, tmp_path: Path) -> None:
+def test_a_flag_takes_a_column_whatever_it_is_called(name: str) -> None:
     log = moving_log(200)
-    rows = {
-        "t": log.t,
-        name: log.theta[0],
-        "q2": log.theta[1],
-        "tau1": log.tau[0],
-        "tau2": log.tau[1],
-    }
-    pl.DataFrame(rows).write_parquet(tmp_path / "arm.parquet")
+    columns = ("t", name, "q2", "tau1", "tau2")
+    frame = pl.DataFrame(dict(zip(columns, (log.t, *log.theta, *log.tau), strict=True)))
     flags = Remedy({"theta1.source": name, "theta2.source": "q2"}).flags
     profile = profile_from({"set": [*flags[1::2]]})  # each behind its --set
     assert profile is not None
     assert profile.theta1.source == name
-    assert np.array_equal(read_log(tmp_path / "arm.parquet", profile).theta, log.theta)
+    assert np.array_equal(read_log(frame, profile).theta, log.theta)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_draft_reads_its_log_whatever_its_joints_are_called(name: str, tmp_path: Path) -> None:
     """TOML has no halves of characters, as JSON has."""
-    stamps = [EPOCH_NS + step * 1_000_000 for step in range(10)]
-    states = [joint_state(one, [name, "elbow"], [1, 2], [], [3, 4]).done() for one in stamps]
-    write_mcap(
-        tmp_path / "arm.mcap", [(f"/{name}", *one) for one in zip(stamps, states, strict=True)]
-    )
-    text = draft_profile(inspect_log(tmp_path / "arm.mcap"))
+    states = sent(noise_log(10), name=[name, "elbow"], topic=f"/{name}")
+    path = written("cdr", tmp_path, States(states))
+    text = draft_profile(inspect_log(path))
     content = tomllib.loads(text)
     assert (content["topic"], content["joints"]) == (f"/{name}", [name, "elbow"])
     (tmp_path / "algid.toml").write_text(text, encoding="utf-8")
-    found = read_log(tmp_path / "arm.mcap", load_profile(tmp_path / "algid.toml"))
+    found = read_log(path, load_profile(tmp_path / "algid.toml"))
     assert found.origin.mapping["theta1"] == f"/{name}: position[{name}]"
     assert "STATED_UNUSED" not in {notice.code for notice in found.notices}
 
