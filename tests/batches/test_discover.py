@@ -115,24 +115,27 @@ def test_a_pattern_that_holds_nothing_or_two_stars_is_refused(tmp_path: Path) ->
 
 
 def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
-    rows = (
+    (tmp_path / "m.csv").write_text(
         "name,logs,loaded,profile,robot,time,payload,site\n"
-        "d1,a.csv;b.csv,/l/c.csv,arm.toml,r1,2026-01-31T12:00:00Z,0.5,Ulm\n"
+        "d1,a.csv;b.csv,/l/c.csv,arm.toml,7,2026-01-31T12:00:00Z,0.5,Ulm\n"
     )
-    (tmp_path / "m.csv").write_text(rows)
     (tmp_path / "m.toml").write_text(
         '[[job]]\nname="d1"\nlogs=["a.csv", '
-        '"b.csv"]\nloaded="/l/c.csv"\nprofile="arm.toml"\nrobot="r1"\n'
+        '"b.csv"]\nloaded="/l/c.csv"\nprofile="arm.toml"\nrobot=7\n'
         'time=2026-01-31T12:00:00Z\npayload=0.5\nsite="Ulm"\n'
     )
     assert is_manifest(tmp_path / "m.csv")
     (first,) = jobs_of([str(tmp_path / "m.csv")], "out")
-    (second,) = jobs_of([str(tmp_path / "m.toml")], "out")
-    assert first == second
-    assert first.logs == (str(tmp_path / "a.csv"), str(tmp_path / "b.csv"))
-    assert first.profile == str(tmp_path / "arm.toml")
-    assert first.labels == {"payload": 0.5, "site": "Ulm"}
-    assert first.time == "2026-01-31T12:00:00+00:00"
+    assert jobs_of([str(tmp_path / "m.toml")], "out") == [first]
+    assert first == Job(
+        "d1",
+        logs=(str(tmp_path / "a.csv"), str(tmp_path / "b.csv")),
+        loaded=("/l/c.csv",),
+        profile=str(tmp_path / "arm.toml"),
+        robot="7",
+        time="2026-01-31T12:00:00+00:00",
+        labels={"payload": 0.5, "site": "Ulm"},
+    )
 
 
 BAD = {
@@ -173,28 +176,19 @@ def test_a_bad_manifest_is_refused_by_its_place(
 
 
 def test_a_manifest_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(
-        SettingError, match=r"m\.toml: cannot read it .*No such file.*check the name$"
-    ):
+    with pytest.raises(SettingError, match=r"m\.toml: cannot read it .*No such file.*check the"):
         jobs_of([str(tmp_path / "m.toml")], "out")
     (tmp_path / "m.csv").write_bytes(b"name,logs\nx,\xff.csv\n")
-    with pytest.raises(
-        SettingError, match=r"m\.csv: the manifest cannot be read .*utf-8.*mend it$"
-    ):
+    with pytest.raises(SettingError, match=r"m\.csv: the manifest cannot be read .*utf-8.*mend it"):
         jobs_of([str(tmp_path / "m.csv")], "out")
 
 
 def test_what_else_a_row_holds_is_a_label(tmp_path: Path) -> None:
-    path = tmp_path / "m.toml"
-    path.write_text(
-        "[[job]]\nname = 'x'\nlogs = 's3://lab/a.csv'\nrobot = 7\npayload = 0.5\nruns = 3\ngood = "
-        "true\nat = 2026-01-31"
-    )
-    (job,) = jobs_of([str(path)], "out")
-    assert job.logs == ("s3://lab/a.csv",)
-    assert job.robot == "7"
-    assert job.labels == {"payload": 0.5, "runs": 3, "good": True, "at": "2026-01-31"}
-    assert (job.profile, job.time, job.loaded) == (None, None, ())
+    labels = "runs = 3\ngood = true\nat = 2026-01-31\nlogs = 's3://lab/a.csv'"
+    (tmp_path / "m.toml").write_text(f"[[job]]\nname = 'x'\n{labels}")
+    said: dict[str, Any] = {"runs": 3, "good": True, "at": "2026-01-31"}
+    found = Job("x", ("s3://lab/a.csv",), labels=said)
+    assert jobs_of([str(tmp_path / "m.toml")], "out") == [found]
 
 
 @pytest.mark.parametrize(
@@ -202,11 +196,7 @@ def test_what_else_a_row_holds_is_a_label(tmp_path: Path) -> None:
 )
 def test_a_name_that_could_leave_the_folder_of_results_is_refused(name: str) -> None:
     assert name_fault(name) is not None
-
-
-def test_a_name_may_hold_slashes_and_any_printable_character() -> None:
-    for name in ("a", "r1/day 2/a.b", "ä" * 100, "…", "a" * 200 + "/" + "b" * 200):
-        assert name_fault(name) is None
+    assert name_fault("r1/day 2/a.b" + "/…" + "/ä" * 100) is None
 
 
 def test_a_folder_where_nobody_may_look_fails_alone(
@@ -222,17 +212,10 @@ def test_a_folder_where_nobody_may_look_fails_alone(
 
     monkeypatch.setattr(os, "scandir", refused)
     locked, good = jobs_of([str(tmp_path)], "out")
-    assert (
-        locked.trouble
-        == f"{tmp_path}/locked: cannot look there (Permission denied); check its rights"
-    )
+    place = f"{tmp_path}/locked: cannot look there"
+    assert locked.trouble == f"{place} (Permission denied); check its rights"
     assert (good.name, good.trouble) == ("a", None)
-    with pytest.raises(
-        SettingError,
-        match=rf"^{tmp_path}/locked: cannot look there \(.*denied: .*\); check its name",
-    ):
-        jobs_of([str(tmp_path / "locked")], "out")
-    for source in ("x" * 5000, "a\0b"):
+    for source in (str(tmp_path / "locked"), "x" * 5000, "a\0b"):
         with pytest.raises(
             SettingError, match=r": cannot look there \(.*\); check its name|no such file"
         ):

@@ -216,28 +216,20 @@ def test_a_full_disk_stops_a_batch_that_ends_as_undisturbed_once_there_is_room(
     assert _digest(out) == undisturbed.digest
 
 
-def test_on_dask_the_death_of_a_worker_changes_no_result(
-    logs: Path, tmp_path: Path, dask: Dask, undisturbed: Undisturbed
+@pytest.mark.parametrize("victim", ["worker", "batch"])
+def test_on_dask_the_death_of_a_worker_or_of_the_batch_changes_no_result(
+    logs: Path, tmp_path: Path, dask: Dask, undisturbed: Undisturbed, victim: str
 ) -> None:
-    victim, _ = dask.worker(), dask.worker()
-    first = _start(logs, tmp_path / "out", "--scheduler", dask.address)
+    worker, _ = dask.worker(), dask.worker()
+    running = _start(logs, tmp_path / "out", "--scheduler", dask.address)
     wait_for_records(tmp_path / "out", 1)
-    victim.kill()
-    told, errors = first.communicate()
-    assert first.returncode == 0, errors
+    if victim == "worker":
+        worker.kill()
+    else:
+        running.kill()
+        running.communicate()
+        running = _start(logs, tmp_path / "out", "--scheduler", dask.address)
+    told, errors = running.communicate()
+    assert running.returncode == 0, errors
     assert f"{JOBS} ok" in told
     assert _digest(tmp_path / "out") == undisturbed.digest
-
-
-def test_on_dask_the_death_of_the_batch_changes_no_result(
-    logs: Path, tmp_path: Path, dask: Dask, undisturbed: Undisturbed
-) -> None:
-    dask.worker()
-    second = _start(logs, tmp_path / "again", "--scheduler", dask.address)
-    wait_for_records(tmp_path / "again", 2)
-    second.kill()
-    second.communicate()
-    last = _start(logs, tmp_path / "again", "--scheduler", dask.address)
-    _, errors = last.communicate()
-    assert last.returncode == 0, errors
-    assert _digest(tmp_path / "again") == undisturbed.digest

@@ -8,7 +8,6 @@ import io
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,11 +18,11 @@ import algid
 from algid.base.errors import AlgidError, LogError, OutputError, without_credentials
 from algid.base.stores import connect, list_urls, open_store, put_folder
 from algid.batches.discover import jobs_of
-from algid.batches.job import Task, fetched
+from algid.batches.job import fetched
 from algid.batches.jobs import JobStatus
-from algid.batches.run import Batch, Batched
+from algid.batches.run import Batched
 from algid.synth.sensors import Sensors
-from tests.batches.test_run import WEAK, Here, batch_of
+from tests.batches.test_run import batch_of
 from tests.objects import Served, s3
 from tests.processes import Outcome
 
@@ -70,9 +69,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 def _run(served: Served, place: str | None = None, user: str = "", report: bool = False) -> Batched:
     out = served.url("out", user) if place is None else place
-    jobs = jobs_of([served.url("logs", user)], out)
-    task_of = partial(Task, settings=WEAK, out=out, report=report)
-    return Batch(open_store(out), task_of, Here().submit, 1, lambda *_: None).run(jobs)
+    return batch_of(out, report=report).run(jobs_of([served.url("logs", user)], out))
 
 
 def _ends(ended: Batched) -> dict[str, JobStatus]:
@@ -170,10 +167,9 @@ def test_credentials_are_not_printed(served: Served, source: str, out: str, code
 
 def test_a_bucket_that_is_not_there_is_told(served: Served) -> None:
     absent = f"s3://no-such-lab/logs{served.query}"
-    with pytest.raises(OutputError, match="no-such-lab/logs: there is no such bucket"):
-        jobs_of([absent], "out")
-    with pytest.raises(OutputError, match="no-such-lab/logs: there is no such bucket"):
-        _run(served, absent)
+    for ask in (lambda: jobs_of([absent], "out"), lambda: _run(served, absent)):
+        with pytest.raises(OutputError, match="no-such-lab/logs: there is no such bucket"):
+            ask()
 
 
 @pytest.mark.parametrize("method", ["HEAD", "GET"])
@@ -219,8 +215,7 @@ def test_what_a_batch_wrote_below_its_source_is_no_log(
     for _ in range(2):
         jobs = jobs_of([served.url("")], out)
         assert [job.name for job in jobs] == ["logs/jobs", "logs/r 1/a"]
-        task_of = partial(Task, settings=WEAK, out=out)
-        Batch(open_store(out), task_of, Here().submit, 1, lambda *_: None).run(jobs)
+        batch_of(out, report=True).run(jobs)
 
 
 def _folder(place: Path, *names: str) -> Path:
@@ -251,30 +246,24 @@ def test_a_new_result_leaves_nothing_of_the_old_one(served: Served, tmp_path: Pa
 
 
 @pytest.mark.parametrize("kind", ["folder", "objects"])
-def test_a_log_that_fails_once_changed_keeps_no_result(
+def test_a_log_that_fails_once_changed_or_for_its_settings_keeps_no_result(
     served: Served, log: bytes, tmp_path: Path, kind: str
 ) -> None:
     place = served.url("out") if kind == "objects" else str(tmp_path / "out")
     logs = open_store(served.url("logs"))
-    for name in ("a", "b"):
+    for name in ("a", "b", "c"):
         logs.write(f"{name}.csv", log)
     _run(served, place)
     logs.write("a.csv", b"junk")
-    assert _ends(_run(served, place)) == {"a": JobStatus.FAILED, "b": JobStatus.OK}
-    assert [name for name in open_store(place).names("") if ".algid/" in name] == [
-        "b.algid/result.json"
+    first, *rest = jobs_of([served.url("logs")], place)
+    jobs = [first, replace(rest[0], trouble="no such profile"), rest[1]]
+    assert [one.status.value for one in batch_of(place).run(jobs).records] == [
+        "failed",
+        "failed",
+        "ok",
     ]
-
-
-def test_a_job_that_fails_for_its_settings_leaves_no_result_of_an_earlier_run(
-    served: Served, log: bytes
-) -> None:
-    open_store(served.url("logs")).write("a.csv", log)
-    _run(served)
-    for job in jobs_of([served.url("logs")], served.url("out")):
-        failed = replace(job, trouble="no such profile")
-        assert _ends(batch_of(served.url("out")).run([failed])) == {"a": JobStatus.FAILED}
-    assert not open_store(served.url("out")).exists("a.algid/result.json")
+    kept = [name for name in open_store(place).names("") if ".algid/" in name]
+    assert kept == ["c.algid/result.json"]
 
 
 def _replacing(served: Served, key: str, content: bytes, at: int) -> Callable[[str], None]:

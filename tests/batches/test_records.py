@@ -62,7 +62,6 @@ def _sound() -> dict[str, Any]:
     return asdict(record)
 
 
-HUGE = 10**400
 WRONG: dict[str, Any] = {
     "a name of another type": lambda r: r["job"].update(name=5),
     "another job's": lambda r: r["job"].update(name="a"),

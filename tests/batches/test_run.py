@@ -73,10 +73,21 @@ def logs(made: Path, tmp_path: Path) -> Path:
 WEAK = Settings(estimator="weak", model="plain")
 
 
-def batch_of(out: str | Path, here: Here | None = None, settings: Settings = WEAK) -> Batch:
+def batch_of(
+    out: str | Path, here: Here | None = None, settings: Settings = WEAK, report: bool = False
+) -> Batch:
     """A batch on `out` that runs its jobs in this process."""
-    task_of = partial(Task, settings=settings, out=str(out), report=False)
+    task_of = partial(Task, settings=settings, out=str(out), report=report)
     return Batch(open_store(str(out)), task_of, (here or Here()).submit, 1, lambda *_: None)
+
+
+QUICK: Any = {"estimator": "weak", "model": "plain", "report": False}
+
+
+@pytest.fixture
+def in_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`algid.batch` runs its jobs in this process."""
+    monkeypatch.setattr("algid.batches.workers.Workers", lambda *_: nullcontext(Here()))
 
 
 def _run(logs: Path, here: Here | None = None, settings: Settings = WEAK) -> Batched:
@@ -107,21 +118,20 @@ def test_a_bad_log_fails_alone_and_the_table_has_a_row_a_job(logs: Path) -> None
     assert "no column for t, theta1" in str(table["reason"][0])
 
 
-def test_what_is_run_anew_is_told(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("algid.batches.workers.Workers", lambda *_: nullcontext(Here()))
-    quick: Any = {"estimator": "weak", "model": "plain", "report": False}
+@pytest.mark.usefixtures("in_process")
+def test_what_is_run_anew_is_told(logs: Path) -> None:
     out = logs.parent / "out"
-    assert algid.batch(logs, out, **quick).anew == {}
+    assert algid.batch(logs, out, **QUICK).anew == {}
     for path in (out / ".jobs").rglob("*.json"):  # as an older algid has left them
         record = json.loads(path.read_text()) | {"version": "0.1", "basis": "another"}
         path.write_text(json.dumps(record))
-    assert algid.batch(logs, out, **quick).anew == {"of algid 0.1": 3}
+    assert algid.batch(logs, out, **QUICK).anew == {"of algid 0.1": 3}
     shutil.rmtree(out / "r1/a.algid")
-    assert algid.batch(logs, out, **quick).anew == {"without their result": 1}
+    assert algid.batch(logs, out, **QUICK).anew == {"without their result": 1}
     (logs / "bad.csv").write_text("other,words\n1,2\n")
-    assert algid.batch(logs, out, **quick).anew == {"of other logs": 1}
-    assert algid.batch(logs, out, retry_failed=True, **quick).anew == {"failed before": 1}
-    done = algid.batch(logs, out, window=0.3, **quick)
+    assert algid.batch(logs, out, **QUICK).anew == {"of other logs": 1}
+    assert algid.batch(logs, out, retry_failed=True, **QUICK).anew == {"failed before": 1}
+    done = algid.batch(logs, out, window=0.3, **QUICK)
     assert (done.anew, done.ran) == ({"of other settings": 3}, 3)
 
 
@@ -135,10 +145,8 @@ def test_a_changed_prior_is_another_setting(logs: Path) -> None:
         assert len(here.ran) == count
 
 
-def test_a_changed_file_of_torques_is_another_log(
-    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("algid.batches.workers.Workers", lambda *_: nullcontext(Here()))
+@pytest.mark.usefixtures("in_process")
+def test_a_changed_file_of_torques_is_another_log(made: Path, tmp_path: Path) -> None:
     log = pl.read_parquet(made / "r1/a-unloaded.parquet")
     angles, torques = tmp_path / "arm.csv", tmp_path / "torques.txt"
     log.select("t", "theta1", "theta2").write_csv(angles)
@@ -184,25 +192,22 @@ def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(
     assert _run(logs).ran == 2
 
 
-def test_parts_share_an_output_and_its_table_is_of_all(
-    logs: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("algid.batches.workers.Workers", lambda *_: nullcontext(Here()))
+@pytest.mark.usefixtures("in_process")
+def test_parts_share_an_output_and_its_table_is_of_all(logs: Path) -> None:
     out = logs.parent / "out"
-    quick: Any = {"estimator": "weak", "model": "plain", "report": False}
     with locked(str(out), shared=True):  # as another part holds it
-        done = [algid.batch(logs, out, part=f"{part}/2", **quick) for part in (1, 2)]
+        done = [algid.batch(logs, out, part=f"{part}/2", **QUICK) for part in (1, 2)]
         with pytest.raises(OutputError, match="another batch is at work"):
-            algid.batch(logs, out, **quick)
+            algid.batch(logs, out, **QUICK)
     assert [[record.job.name for record in one.records] for one in done] == [
         ["bad", "r1/b"],
         ["r1/a"],
     ]
     assert pl.read_parquet(out / "jobs.parquet")["job"].to_list() == ["bad", "r1/a", "r1/b"]
-    assert algid.batch(logs, out, **quick).ran == 0
+    assert algid.batch(logs, out, **QUICK).ran == 0
     for wrong in ("0/2", "3/2"):
         with pytest.raises(SettingError, match=r"^--part: expected 1/N to N/N, and no --watch"):
-            algid.batch(logs, out, part=wrong, **quick)
+            algid.batch(logs, out, part=wrong, **QUICK)
 
 
 def test_a_result_that_must_not_be_used_is_a_failure_with_its_first_reason_and_is_kept(
