@@ -23,7 +23,6 @@ from algid.inspection.figures import (
     differences,
     grid_step,
     noise_floor,
-    robust_deviation,
     saturated_share,
     thinned,
     windows,
@@ -37,10 +36,8 @@ LOOKED_AT = 1 << 18
 """Samples at the beginning of logs in which limits are looked for."""
 _DENORMAL = 1e-6
 _SPIKE = 30.0
-_MARKS, _IN_A_ROW = 8, 3
-"""Samples of one value that are spikes: least of them, and most in a row."""
-_PIECE, _SORTED = 64, 1 << 15
-"""Samples in a row, and in all, among which the commonest value is looked for."""
+_IN_A_ROW = 5
+"""Most doubtful samples in a row: a spike's neighbours bend too."""
 _STANDS, _CLEAR = 0.4, 6.0
 """Turning points: share of the speed three samples off, and that speed over the noise."""
 _DEAD, _DEAD_RUNS = 0.1, 20
@@ -196,70 +193,56 @@ def degrees(log: Log, is_to_scale: Callable[[], bool]) -> Iterator[Notice]:
 def spikes(log: Log) -> Iterator[Notice]:
     """Single samples that fit neither what comes before them nor what follows.
 
-    They lie thirty times further off the middle of their neighbours than noise and bends of the
-    signal do, and so do these neighbours for their sake. The sample after a step fits what follows,
-    and a pulse of the torque where the joint turns back is dry friction's. Of many spikes those
-    count that hold one value, as where a driver writes 0 for a torque that it has missed.
+    Doubtful are those that bend the most, and all that hold the commonest value of such, as where
+    a driver writes 0 for torques that it has missed: those count if most of them are odd. A pulse
+    of the torque where the joint turns back is dry friction's.
     """
     if len(log) < 20:
         return
     for name, values in channels(log):
-        if (marks := _marks(values)).size:
-            seen = {"count": marks.size, "start": float(log.t[marks[0]])}
-            yield _found("SENSOR_FAULT", log.origin, name, case="spikes", **seen)
+        bend = _bend(values)
+        bent = values[1:-1][bend >= quantile(thinned(bend), 0.9)]
+        every, counts = np.unique(bent, return_counts=True)
+        common = values == every[counts.argmax()]
+        rest = np.flatnonzero(~common)
+        even, usual = thinned(rest[2:] - rest[:-2] == 2), thinned(_bend(values[rest]))
+        limit = _SPIKE * quantile(usual[even] if even.any() else usual, 0.9)
+        if not limit > 0:  # hardly a sample differs from its neighbours
             continue
-        off = values[1:-1] - 0.5 * (values[:-2] + values[2:])
-        size = np.abs(off)
-        limit = _SPIKE * max(robust_deviation(off), quantile(thinned(size), 0.9))
-        if limit == 0:
-            continue
-        places = np.flatnonzero(size[1:-1] > limit) + 2
-        own, beside = size[places - 1], np.minimum(size[places - 2], size[places])
-        step = np.abs(values[places + 1] - values[places - 1])
-        places = places[(step < 0.2 * own) & (beside > 0.25 * own)]
+        marks, places = _odd(values, common, limit), _odd(values, np.pad(bend > limit, 1), limit)
+        if 2 * marks.size > np.count_nonzero(common):
+            places = np.union1d(places, marks)
         if places.size and name.startswith("tau"):
             theta = log.theta[int(name[-1]) - 1]
-            travel = np.abs(theta[2:] - theta[:-2])
-            before, here, behind = (
-                travel[np.clip(places + shift, 0, travel.size - 1)] for shift in (-4, -1, 2)
-            )
+            beside = np.clip(places + [[-4], [-1], [2]], 0, theta.size - 3)
+            before, here, behind = np.abs(theta[beside + 2] - theta[beside])
             slower = np.minimum(before, behind)
             turns_back = (here < _STANDS * slower) & (slower > _CLEAR * noise_floor(theta))
             places = places[~turns_back]
         if places.size:
-            seen = {"count": len(places), "start": float(log.t[places[0]])}
+            seen = {"count": places.size, "start": float(log.t[places[0]])}
             yield _found("SENSOR_FAULT", log.origin, name, case="spikes", **seen)
 
 
-def _marks(values: FloatArray) -> NDArray[np.intp]:
-    """Places of samples that hold the commonest value and lie off the line between those around.
+def _odd(values: FloatArray, doubtful: NDArray[np.bool_], limit: float) -> NDArray[np.intp]:
+    """Places of `doubtful` samples beyond `limit` off the line between the others on both sides.
 
-    None unless these are most of the samples that hold it, three in a row at most. They would be
-    noise to `spikes`, which looks at the tenth of the samples that bends the most.
+    Without them these others fit one another: the sample after a step has none that do.
     """
-    # of a long log pieces are sorted, all of it being slow; single samples might miss a period's
-    piece = min(_PIECE, values.size)
-    step = piece * max(1, values.size // _SORTED)
-    rows = values[: values.size // step * step].reshape(-1, step)
-    every, counts = np.unique(rows[:, :piece], return_counts=True)
-    common = values == every[np.argmax(counts)]
-    here, rest = np.flatnonzero(common), np.flatnonzero(~common)
-    if here.size < _MARKS or rest.size < 20:
-        return here[:0]
-    others = values[rest]
-    bend = others[1:-1] - 0.5 * (others[:-2] + others[2:])
-    if (even := rest[2:] - rest[:-2] == 2).any():
-        bend = bend[even]
-    limit = _SPIKE * max(robust_deviation(bend), quantile(thinned(np.abs(bend)), 0.9))
+    here, rest = np.flatnonzero(doubtful), np.flatnonzero(~doubtful)
     behind = np.searchsorted(rest, here)
-    inner = (behind > 0) & (behind < rest.size)
+    inner = (behind > 1) & (behind < rest.size - 1)
     here, behind = here[inner], behind[inner]
-    before, after = others[behind - 1], others[behind]
-    off = np.abs(values[here] - 0.5 * (before + after))
-    short = rest[behind] - rest[behind - 1] <= _IN_A_ROW + 1
-    marks = here[short & (off > limit) & (np.abs(after - before) < 0.2 * off)]
-    enough = limit > 0 and marks.size > max(_MARKS, 0.5 * np.count_nonzero(common))
-    return marks if enough else marks[:0]
+    before, after = rest[behind - 1], rest[behind]
+    off = np.abs(values[here] - 0.5 * (values[before] + values[after]))
+    bend = _bend(values[rest])
+    fits = np.maximum(bend[behind - 2], bend[behind - 1]) < 0.2 * off
+    return here[fits & (off > limit) & (after - before <= _IN_A_ROW + 1)]
+
+
+def _bend(values: FloatArray) -> FloatArray:
+    """How far each inner sample lies off the middle of its neighbours."""
+    return np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
 
 
 def saturation(*logs: Log, gravity: float = 9.81, effort: str | None = None) -> Saturation:
