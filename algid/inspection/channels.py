@@ -90,46 +90,36 @@ def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
             yield _found("SATURATED_EFFORT", log.origin, name, percent=100 * share, case=case)
 
 
-def held_efforts(log: Log) -> Iterator[Notice]:
-    """Torques that hold values for several samples, at a slower clock, while the angle moves.
+def held(log: Log, is_external: bool) -> Iterator[Notice]:
+    """Channels that keep values for several samples, by the lengths of such runs.
 
-    A torque in coarse counts keeps its values too, but changes whenever it passes a count: its runs
-    are of every length. A log whose angles are held as well was recorded slowly as a whole.
+    Torques that do so at a slower clock while the angle moves: those in coarse counts change
+    whenever they pass a count, and their runs are of every length; a log whose angles are held as
+    well was recorded slowly as a whole. Torques that keep one value far longer than elsewhere, not
+    at a limit: an external one does where nothing pulls. Angles that keep one until they jump: one
+    that rests goes on by a usual step.
     """
-    for (name, tau), theta in zip(channels(log, ("tau",)), log.theta, strict=True):
-        changes = np.flatnonzero(np.diff(tau))
-        runs = np.diff(changes)
-        usual = median(thinned(runs))
-        if changes.size < _HELD_RUNS or usual < 2:
-            continue
-        off = np.abs(runs - usual * np.maximum(1.0, np.round(runs / usual)))
-        moves = np.count_nonzero(np.diff(theta)) > 1.5 * changes.size
-        if moves and np.mean(off <= _OFF_STEP * usual) >= _IN_STEP:
-            late = 0.5e3 * (usual - 1) * log.period  # ms, in the mean
-            held = 1e3 * usual * log.period
-            yield _found("HELD_EFFORT", log.origin, name, held=held, late=late)
-
-
-def stuck(log: Log, quantities: Sequence[str] = ("theta", "tau")) -> Iterator[Notice]:
-    """Torques that keep one value far longer than elsewhere, angles that do so until they jump.
-
-    A run at the largest or the smallest torque is a limit's, slow publishers repeat every value as
-    often, and an angle that rests goes on by a usual step.
-    """
-    for name, values in channels(log, quantities):
+    for name, values in channels(log):
         sizes = np.abs(np.diff(values))
         changes = np.flatnonzero(sizes)
         runs = np.diff(changes)
         if not runs.size or runs.size == sizes.size - 1:  # no run is longer than a sample
             continue
-        case = "torque" if name.startswith("tau") else "angle"
-        if case == "torque":
-            held = values[changes[1:]]
+        if name.startswith("tau"):
+            case, usual = "torque", median(thinned(runs))
+            off = np.abs(runs - usual * np.maximum(1.0, np.round(runs / usual)))
+            clocked = changes.size >= _HELD_RUNS and usual >= 2
+            moves = np.count_nonzero(np.diff(log.theta[int(name[-1]) - 1])) > 1.5 * changes.size
+            if clocked and moves and np.mean(off <= _OFF_STEP * usual) >= _IN_STEP:
+                lasts = 1e3 * usual * log.period  # ms
+                late = 0.5 * (lasts - 1e3 * log.period)  # in the mean
+                yield _found("HELD_EFFORT", log.origin, name, held=lasts, late=late)
+            kept = values[changes[1:]]
             least = max(_DEAD / log.period, _DEAD_RUNS * quantile(thinned(runs), 0.95))
-            long = (runs >= least) & (held > values.min()) & (held < values.max())
-            long &= changes.size >= _DEAD_RUNS
+            long = (runs >= least) & (kept > values.min()) & (kept < values.max())
+            long &= (changes.size >= _DEAD_RUNS) and not is_external
         else:
-            usual = quantile(thinned(sizes[changes]), 0.99)
+            case, usual = "angle", quantile(thinned(sizes[changes]), 0.99)
             long = (runs > max(10, round(0.02 / log.period))) & (sizes[changes[1:]] > 5 * usual)
         longest = int(np.argmax(runs * long))
         if long[longest]:

@@ -21,12 +21,11 @@ from algid.inspection.channels import (
     clipped,
     degrees,
     efforts,
-    held_efforts,
+    held,
     rests,
     sampling,
     saturation,
     spikes,
-    stuck,
 )
 from algid.inspection.conventions import doubted, is_to_scale, judged, mend
 from algid.inspection.figures import (
@@ -184,8 +183,7 @@ def examine(
     is_external = effort == "external"
     found = [
         *(() if is_external else efforts(log, known)),
-        *held_efforts(log),
-        *stuck(log, ("theta",) if is_external else ("theta", "tau")),
+        *held(log, is_external),
         *angles(log),
         *degrees(log, lambda: is_to_scale(tried())),
         *spikes(log),

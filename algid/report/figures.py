@@ -33,8 +33,7 @@ def figures(folder: Path, result: Result, raw: Drawn | None) -> list[Panels]:
     """Every figure that the folder gives, in the page's order; `raw` are the torque's samples."""
     made: list[Panels | None] = [residual(folder), over_time(folder, result, "running")]
     if raw is not None:
-        made = [torque(folder, result, raw), closeup(result, raw), *made]
-        made += [signals(result, raw), coverage(raw)]
+        made = [torque(folder, result, raw), *made, signals(result, raw), coverage(raw)]
     made += [correlation(result), information(folder)]
     return [plot for plot in made if plot is not None]
 
@@ -90,19 +89,6 @@ def torque(folder: Path, result: Result, raw: Drawn) -> Panels:
     _name_logs(panels, result, shown, 4)
     if result.fit is not None and result.fit.prediction is not None:
         panels.title += result.fit.prediction.band
-    return panels
-
-
-def closeup(result: Result, raw: Drawn) -> Panels:
-    """One second about the largest residual of each joint, every sample."""
-    titles = []
-    for joint, (size, t, log, _) in raw.worst.items():
-        of = f" of {file_name(result.logs[log].path)}" if len(raw.starts) > 1 else ""
-        titles.append(f"Joint {joint}: {significant(size, 3)} N m at {t:.3f} s{of}")
-    panels = Panels("closeup", titles)
-    for place, (_, t, _, rows) in enumerate(raw.worst.values()):
-        panels.draw(place, rows["t"] - t, rows)
-        panels.axes(place, "time from there, s", "N m")
     return panels
 
 

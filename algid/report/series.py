@@ -6,7 +6,7 @@ does.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
@@ -30,7 +30,6 @@ ROWS = 1 << 18
 POINTS = 2_400
 """Of a series: twice what a page is wide."""
 SAMPLES = 2_000
-HALF = 0.5  # s before and after the largest residual
 GOLDEN = 0.6180339887498949
 
 
@@ -49,44 +48,28 @@ def _parquet(path: Path) -> Iterator[Any]:
         raise ResultError(f"{path}: cannot read it as Parquet ({reason}); {AGAIN}") from error
 
 
-def blocks(path: Path, names: Sequence[str] = (), rows: int = ROWS) -> Iterator[Block]:
-    """Yield columns `names` of `path`, by default all, `rows` samples at a time.
-
-    What is missing is NaN.
-
-    Raises
-    ------
-    ResultError
-        If the file cannot be read, or lacks a column.
-    """
-    with _parquet(path) as file:
-        missing = set(names) - set(file.schema_arrow.names)
-        if missing:
-            raise ResultError(f"{path}: it has no column {min(missing)!r}; {AGAIN}")
-        for batch in file.iter_batches(batch_size=rows, columns=list(names) or None):
-            yield {name: numbers_of(batch.column(name)) for name in batch.schema.names}
-
-
 def stretches(
     path: Path, stage: str, progress: Progress | None = None, rows: int = ROWS
 ) -> Iterator[tuple[int, Block]]:
     """Pairs of a log and its stretch of a block, with what a prediction leaves of the torque.
 
-    `progress` hears how many samples have been used. Raises `ResultError`.
+    What is missing is NaN. `progress` hears how many samples have been used. Raises `ResultError`.
     """
-    (total, _), done = facts_of(path), 0
-    for block in blocks(path, rows=rows):
-        for joint in (1, 2):
-            if f"tau{joint}_predicted" in block:
-                left = block[f"tau{joint}"] - block[f"tau{joint}_predicted"]
-                block[f"residual{joint}"] = left
-        logs = block.setdefault("log", np.zeros(block["t"].size))
-        firsts = np.flatnonzero(np.diff(logs, prepend=-1)).tolist()
-        for first, last in pairwise([*firsts, logs.size]):
-            yield int(logs[first]), rows_of(block, slice(first, last))
-        done += logs.size
-        if progress is not None:
-            progress(stage, done, total)
+    done = 0
+    with _parquet(path) as file:
+        for batch in file.iter_batches(batch_size=rows):
+            block = {name: numbers_of(batch.column(name)) for name in batch.schema.names}
+            for joint in (1, 2):
+                if f"tau{joint}_predicted" in block:
+                    left = block[f"tau{joint}"] - block[f"tau{joint}_predicted"]
+                    block[f"residual{joint}"] = left
+            logs = block.setdefault("log", np.zeros(block["t"].size))
+            firsts = np.flatnonzero(np.diff(logs, prepend=-1)).tolist()
+            for first, last in pairwise([*firsts, logs.size]):
+                yield int(logs[first]), rows_of(block, slice(first, last))
+            done += logs.size
+            if progress is not None:
+                progress(stage, done, file.metadata.num_rows)
 
 
 def table(path: Path) -> dict[str, NDArray[Any]]:
@@ -116,13 +99,11 @@ class Drawn:
     columns : with `x`, the time that runs on from log to log, s, and NaN rows where a line breaks
     starts : where each log begins on the axis `x`
     samples : whole rows spread evenly over the logs
-    worst : by joint the largest residual, when in s, in which log, and its block's samples about it
     """
 
     columns: Block
     starts: dict[int, float]
     samples: Block
-    worst: dict[int, tuple[float, float, int, Block]]
 
     def __getitem__(self, name: str) -> FloatArray:
         return self.columns[name]
@@ -142,7 +123,7 @@ def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) ->
         return None
     total, _ = facts_of(path)
     bucket, step = max(1, -(-2 * total // points)), max(1, total // SAMPLES)
-    parts, samples, worst = list[Block](), list[Block](), dict[int, Any]()
+    parts, samples = list[Block](), list[Block]()
     period, starts = 0.0, dict[int, float]()
     for log, part in stretches(path, "report", progress):
         t = part["t"]
@@ -151,12 +132,6 @@ def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) ->
             shift = starts[log] - t[0]
         part["x"] = t + shift
         period = max(period, median(np.diff(t)))  # NaN, of one sample, is not larger
-        for joint in (1, 2) if "residual2" in part else ():
-            size = np.abs(np.nan_to_num(part[f"residual{joint}"]))
-            place = int(size.argmax())
-            if size[place] > worst.get(joint, (-1.0,))[0]:
-                near = rows_of(part, np.abs(t - t[place]) <= HALF)
-                worst[joint] = float(size[place]), float(t[place]), log, near
         # which sample of a stretch moves by the golden ratio: never in step with the motion
         at = np.arange(-(-t.size // step))
         at = np.minimum((step * (at + np.mod(at * GOLDEN, 1))).astype(int), t.size - 1)
@@ -170,7 +145,7 @@ def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) ->
     for name, values in columns.items():
         nothing = values[broken - 1] if name in ("log", "x") else np.nan
         columns[name] = np.insert(values, broken, nothing)
-    return Drawn(columns, starts, concatenated(samples), worst)
+    return Drawn(columns, starts, concatenated(samples))
 
 
 def reduced(part: Block, size: int) -> Block:

@@ -19,7 +19,7 @@ from algid.base.files import first_misfit, read_whole, whole_file
 from algid.base.significance import NORMAL, SURE
 from algid.notices import Notice
 from algid.report.export import START_KEY
-from algid.report.series import blocks
+from algid.report.series import table
 from algid.results import LogSummary
 
 FILE, CURVE = "track.json", "track.parquet"
@@ -207,12 +207,14 @@ def read_track(folder: Path) -> TrackResult:
         raise ResultError(f"{path}: cannot read it ({error.strerror})") from error
     except ValidationError as error:
         raise ResultError(f"{path}: {first_misfit(error)}; {again}") from error
-    parts = list(blocks(folder / CURVE, COLUMNS))
-    if not parts or not all(np.all(part["high"] >= part["m_p"]) for part in parts):
+    try:
+        curve = table(folder / CURVE)
+        t, m_p, high, stretch, left = (curve[name].astype(np.float64) for name in COLUMNS)
+    except (KeyError, ValueError, TypeError) as error:
+        lacking = f"expected numbers in the columns {', '.join(COLUMNS)} ({error})"
+        raise ResultError(f"{folder / CURVE}: {lacking}; {again}") from error
+    if not t.size or not np.all(high >= m_p):
         raise ResultError(f"{folder / CURVE}: it holds no rows, or rows without interval; {again}")
-    t, m_p, high, stretch, left = (
-        np.concatenate([part[name] for part in parts]) for name in COLUMNS
-    )
     return TrackResult(
         track=Track(
             stretches=file.stretches,

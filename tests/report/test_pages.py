@@ -35,7 +35,7 @@ from tests.report.folders import HOSTILE, hostile
 from tests.report.pages import Page, typed
 
 FIGURES = [
-    "intervals", "torque", "closeup", "residual", "running", "signals", "coverage",
+    "intervals", "torque", "residual", "running", "signals", "coverage",
     "correlation", "information", "estimates", "loaded",
 ]  # fmt: skip
 
