@@ -27,10 +27,3 @@ def test_what_is_missing_is_no_number(values: list[float | bool | None]) -> None
     np.testing.assert_array_equal(
         numbers_of(column), column.to_numpy(zero_copy_only=False).astype(float)
     )
-
-
-def test_texts_and_what_is_mixed_are_arrows() -> None:
-    columns: dict[str, object] = {"text": ["k₁", "", "a b"], "maybe": [1.0, None, 2.0]}
-    assert table_of_columns(columns).equals(pyarrow.table(columns))
-    empty: dict[str, object] = {"text": [], "x": np.zeros(0)}
-    assert table_of_columns(empty).equals(pyarrow.table(empty))

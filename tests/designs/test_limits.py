@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.base.errors import SettingError
 from algid.base.significance import SURE
 from algid.designs.belief import Load
 from algid.designs.information import Sensitivities
@@ -116,25 +115,3 @@ def test_a_weak_arm_rests_where_it_needs_least() -> None:
     )
     np.testing.assert_allclose(rest, grid[:, np.argmin(worst)])
     assert worst.min() < 1 < worst[grid.shape[1] // 2] / 0.7  # the middle would not have done
-
-
-def test_what_no_posture_keeps_is_named_with_what_it_misses() -> None:
-    high = but(0.5, -1.25, range=[0.75, 0.1], torque=np.inf)
-    with pytest.raises(SettingError) as refused:
-        resting(high, Model(), [])
-    best = 0.4 * np.sin(-0.5) + 0.3 * np.sin(-0.4)
-    share = 100 * (0.7 - best) / (0.7 - 0.5)
-    assert str(refused.value) == (
-        "--set tip_height: even at rest, wherever within --range, tip height, takes "
-        f"{share:.4g} % of its limit (margin included); allow more, or move or widen --range"
-    )
-    least = 100 * (4 * np.cos(0.1) + np.cos(0.2)) / 3.0
-    for loaded in (False, True):
-        arm = load(np.zeros((7, 1)), box=True, loaded=loaded)
-        with pytest.raises(SettingError) as refused:
-            resting(but(middle=0.0, range=0.1, torque=[3.0, 9.0]), Model(), [arm])
-        words = "loaded" if loaded else "unloaded"
-        assert str(refused.value).startswith(
-            f"--torque: even at rest, wherever within --range, torque, {words} of joint 1, up, "
-            f"takes {least:.4g} % of its limit"
-        )

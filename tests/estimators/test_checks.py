@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from algid.arm import inverse_dynamics
 from algid.estimators import combine as combine_module
 from algid.estimators import weak
 from algid.estimators.combine import (
@@ -20,9 +19,10 @@ from algid.estimators.fit import finish
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import WeakSettings
 from algid.model import Model
+from tests.identification.fits import CASE, fit_of, information, with_values
 from tests.intervals import holds_95
 
-from .conftest import DT, Bench, problem_of
+from .conftest import Bench, problem_of
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -69,34 +69,21 @@ def test_intervals_of_a_few_logs_hold_where_runs_differ() -> None:
     holds_95(np.array(ratios))
 
 
-def test_each_loaded_run_tells_its_payload_and_how_well_that_repeats(bench: Bench) -> None:
+def test_each_loaded_run_tells_its_payload_and_how_well_that_repeats() -> None:
     """Three payloads in turn, 5 g apart: each is found by itself, and the standard deviation has
     the interval of χ².
     """
-    masses = bench.payload + np.array([-0.005, 0.0, 0.005])
-    z = bench.arm.payload_constants(1.0)
-    bare = [bench.log(sigma=1e-4, seed=seed) for seed in range(3)]
-    added = np.zeros(7)
-    added[[4, 2, 0, 3, 1]] = z  # k5, k3, k1, k4, k2
-    motion = bench.burdened
-    share = inverse_dynamics(
-        added, motion.theta, motion.omega, np.gradient(motion.omega, DT, axis=1, edge_order=2)
-    )
-    burdened = []
-    for seed, mass in enumerate(masses):
-        log = bench.log(loaded=True, sigma=1e-4, seed=seed)
-        burdened.append(replace(log, tau=log.tau + (mass - bench.payload) * share))
-    lengths = {"l1": bench.arm.l1, "l2": bench.arm.l2}
-    fit = weak.fit(problem_of(*bare, loaded=burdened, lengths=lengths))
-    found = repeatability(fit)
-    alone, std, (low, high) = found
-    np.testing.assert_allclose(alone, masses, atol=6e-4)
-    assert std == pytest.approx(0.005, rel=0.15)
+    fit = fit_of()
+    masses = CASE.payload + np.array([-0.005, 0.0, 0.005])
+    loaded = [fit.shared.coefficients(with_values(fit, m_p=mass).values, True) for mass in masses]
+    logs = [fit.logs[0], *(information(c.size, loaded=True, c0=c) for c in loaded)]
+    alone, std, (low, high) = repeatability(replace(fit, logs=tuple(logs)))
+    np.testing.assert_allclose(alone, masses, rtol=1e-9)
+    assert std == pytest.approx(0.005)
     # χ² with two degrees of freedom: 0.0506 and 7.378
     assert low / std == pytest.approx(np.sqrt(2 / 7.378), rel=1e-3)
     assert high / std == pytest.approx(np.sqrt(2 / 0.05064), rel=1e-3)
-    once = weak.fit(problem_of(*bare, loaded=burdened[:1], lengths=lengths))
-    assert repeatability(once) is None
+    assert repeatability(fit) is None
 
 
 @pytest.mark.parametrize("rotor", [0.0, 0.02])

@@ -151,20 +151,6 @@ def test_a_rest_that_friction_holds_accuses_no_zero(bench: Bench) -> None:
     assert found.best.convention == AS_READ
 
 
-def test_logs_of_an_arm_are_judged_together(bench: Bench) -> None:
-    """Halves of a motion tell together what the whole does: the mistake of both, or none."""
-    theta, tau = measured(bench.bare)
-    half = theta.shape[1] // 2
-    for mistake in (AS_READ, Convention(torque_signs=(1, -1))):
-        both = mistake.angles(theta), mistake.torques(tau)
-        parts = [
-            Recorded(both[0][:, own], both[1][:, own], DT) for own in (np.s_[:half], np.s_[half:])
-        ]
-        found = judge_together(parts)
-        assert found.alone
-        assert found.best.convention == mistake
-
-
 @pytest.mark.parametrize("off", [-0.01, 0.01])
 def test_a_balanced_second_link_has_either_sign(off: float) -> None:
     """Its centre of mass is within 1 % of l2 of its axis: half a turn of θ2 changes next to nothing

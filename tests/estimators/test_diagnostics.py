@@ -80,12 +80,6 @@ def test_a_terms_worth_is_schwarzs_price_less_walds_statistic() -> None:
     assert worths["coulomb"] == pytest.approx(2 * np.log(400) - (6**2 + 2**2), rel=1e-9)
     assert worths["rotor"] == pytest.approx(np.log(400) - 2**2, rel=1e-9)
     assert worths["delay"] == pytest.approx(np.log(400) - 0.5**2, rel=1e-9)
-    both = np.zeros((11, 11))
-    both[7, 8] = both[8, 7] = 0.003
-    correlated = replace(fit, covariance=fit.covariance + both)
-    V = correlated.covariance[7:9, 7:9]
-    wald = fit.values[7:9] @ np.linalg.solve(V, fit.values[7:9])
-    assert next(term_worths(correlated))[1] == pytest.approx(2 * np.log(400) - wald, rel=1e-6)
 
 
 def test_the_distance_of_two_arms_is_that_of_what_no_payload_explains(bench: Bench) -> None:

@@ -1,92 +1,19 @@
-"""The score test of a likelihood's residual: by least squares, on sound logs and on others."""
+"""What a likelihood's residual shows, on sound logs and on others."""
 
 from __future__ import annotations
-
-from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from algid.arm import FloatArray, inverse_dynamics
-from algid.base.names import vector
-from algid.estimators.elastic import flexed
-from algid.estimators.log_likelihood import Beside
-from algid.estimators.misfit import misfit, shapes
-from algid.estimators.parametrisation import Shared
-from algid.estimators.terms import Products
-from algid.estimators.whitening import modelled
+from algid.arm import inverse_dynamics
 from algid.identification.identify import identify
-from algid.model import RIGID, TERMS, Model, Motion, torque
+from algid.model import RIGID
 from algid.settings import Settings
 from algid.synth.simulator import HANGING
 from pipelines import conventions, planar
 from pipelines import misfit as scenes
 from pipelines.accuracy_scenes import case_of, logged, waves
 from tests.intervals import distances
-
-DT = 1e-3
-C = np.array([8e-4, 0.05, 2e-3, 0.42, 5.5e-3, 0.136, 0.31, 0.1, 0.05])
-
-
-def motion_of(count: int = 400) -> Motion:
-    rng = np.random.default_rng(5)
-    return Motion(*(size * rng.standard_normal((2, count)) for size in (1.0, 3.0, 20.0)))
-
-
-def told(model: Model, c: FloatArray, motion: Motion, beside: FloatArray) -> tuple[Products, float]:
-    """The test of a log with white noise of unit deviation, and with the torque `beside`."""
-    rng = np.random.default_rng(6)
-    shared, error = Shared(model), rng.standard_normal(motion.theta.shape) + beside
-
-    def products(whole: Shared, c: FloatArray, more: Beside) -> tuple[FloatArray, float]:
-        c = c[:-1]
-        bent = flexed(whole.model, c, motion, DT)
-        J, tau = modelled(whole.model, c, bent, DT)
-        late = np.gradient(tau, DT, axis=1)
-        blocks = J.swapaxes(0, 1), late[None], more(whole.model, c, bent, DT), error[None]
-        rows = np.concatenate(blocks).swapaxes(0, 1)
-        return rows @ rows.swapaxes(1, 2), 0.0
-
-    log = SimpleNamespace(products=products, loaded=False, trained=motion.theta.shape[1])
-    log.kept = [SimpleNamespace(dt=DT, tau=np.ones((2, 1)))]
-    found = Products([log], shared, {False: c}, 0.0, shapes)  # type: ignore[list-item]
-    fit = SimpleNamespace(names=shared.names, values=c, shared=shared)
-    return found, misfit(fit, found, None)  # type: ignore[arg-type]
-
-
-def squares(columns: FloatArray, e: FloatArray) -> float:
-    """What least squares leaves of e."""
-    scaled = columns / np.linalg.norm(columns, axis=1, keepdims=True)
-    h, *_ = np.linalg.lstsq(scaled.T, e, rcond=1e-9)
-    return float(np.sum((e - scaled.T @ h) ** 2))
-
-
-@pytest.mark.parametrize("term", ["offset", "stribeck", "load", "phases"])
-def test_a_term_explains_what_least_squares_with_it_does(term: str) -> None:
-    model, motion = Model(("coulomb",)), motion_of()
-    found, _ = told(model, C, motion, np.zeros((2, 400)))
-    wide = replace(model, terms=("coulomb", term))
-    c = vector(wide.names, dict(zip(model.names, C.tolist(), strict=True)), otherwise=0.0)
-    J, tau = modelled(wide, c, motion, DT)
-    wider = replace(model, coulomb_speed=model.coulomb_speed * 1.001)
-    narrower = replace(model, coulomb_speed=model.coulomb_speed / 1.001)
-    width = (torque(wider, C, motion) - torque(narrower, C, motion))[None]
-    both = np.concatenate([J.swapaxes(0, 1), width]).reshape(-1, 800)
-    own = [name in TERMS[term].names for name in wide.names] + [False]
-    e = (tau + np.random.default_rng(6).standard_normal(tau.shape)).ravel()
-    explained = squares(both[~np.array(own)], e) - squares(both, e)
-    _, without, _ = found.solve(found.columns(["coulomb"]))
-    _, left, _ = found.solve(found.columns(["coulomb", term]))
-    assert without - left == pytest.approx(explained, rel=1e-3)
-
-
-def test_white_noise_is_no_misfit_and_a_shape_of_no_term_is() -> None:
-    motion, model = motion_of(), Model(("coulomb",))
-    assert told(model, C, motion, np.zeros((2, 400)))[1] > 0.01
-    assert told(model, C, motion, 0.6 * np.sin(2 * motion.theta))[1] < 1e-4
-    far = replace(motion, theta=4 * motion.theta)
-    assert told(model, C, far, 0.1 * far.theta)[1] < 1e-4
 
 
 def test_a_spring_near_the_hanging_arm_is_no_weight_beyond_its_interval() -> None:

@@ -13,7 +13,6 @@ from algid.estimators.noise import (
     VarianceScore,
     first_guess,
     quantum,
-    roughness,
     variance_score,
 )
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise
@@ -135,19 +134,3 @@ def test_torque_that_a_controller_makes_of_the_angles_noise_is_no_noise(noise: f
     found = first_guess(*_loop(noise))
     np.testing.assert_allclose(found.tau, noise, rtol=0.06)
     np.testing.assert_allclose(found.theta, 1e-3, rtol=0.06)
-
-
-def test_jumps_of_the_torque_are_rough_and_slow_errors_are_not() -> None:
-    """A step of height h in n samples has h² 252 / (924 n) of the sixth differences' power."""
-    draw = np.random.default_rng(5)
-    n, h = 20_000, 3.0
-    noise = draw.normal(0, 0.01, (2, n))
-    jumps = np.zeros((2, n))
-    jumps[0] = h * (np.arange(n) // 500 % 2)
-    slow = 5 * np.sin(2 * np.pi * 3 * np.arange(n) * 1e-3)
-    found = roughness(noise + jumps + slow)
-    share = (n // 500 - 1) / (n - 6)
-    assert found[0] == pytest.approx(np.sqrt(1e-4 + h**2 * share * 252 / 924), rel=0.02)
-    assert found[1] == pytest.approx(0.01, rel=0.03)
-    angles = draw.normal(0, 1e-3, (2, n))
-    assert first_guess(angles, noise + jumps + slow).tau == pytest.approx([0.01, 0.01], rel=0.05)

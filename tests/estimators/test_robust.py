@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.estimators import instruments, robust, weak
+from algid.estimators import robust, weak
 from algid.estimators.combine import LogInformation
 from algid.estimators.fit import Fit
 from algid.estimators.modulating_functions import OVERLAP
@@ -170,11 +170,6 @@ def test_a_reference_is_the_instrument_under_feedback() -> None:
     assert off(found, made)[0] < 0.5 * off(least, made)[0]  # k1 is attenuated most
     known = problem(made, reference=True)
     assert robust.with_feedback_noted(found, known).notes == found.notes
-    asked = instruments.fit(known)
-    by_torque = instruments.fit(problem(made))
-    truth = made.arm.constants()[:5]
-    error, worse = (np.abs(fit.values[:5] / truth - 1).mean() for fit in (asked, by_torque))
-    assert error < 0.5 * worse
 
 
 @pytest.mark.slow

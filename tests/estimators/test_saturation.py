@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from algid.estimators.saturation import Limit, saturation_of, sound
-from algid.signals.segments import Segment, append
+from algid.signals.segments import Segment
 from pipelines import saturation
 
 DT = 1e-3
@@ -62,11 +62,13 @@ def ramp(count: int = 2000) -> Segment:
     return Segment(0.0, DT, theta, tau)
 
 
-def test_what_is_left_lies_within_the_limits_and_ten_milliseconds_off() -> None:
+@pytest.mark.parametrize("size", [1, 7, 64, 700, 2000])
+def test_what_is_left_lies_ten_milliseconds_off_the_limits_however_it_was_cut(size: int) -> None:
     whole = ramp()
+    parts = [whole.part(first, first + size) for first in range(0, len(whole), size)]
     beyond = LIMITS[0].beyond(whole.tau) | LIMITS[1].beyond(whole.tau)
     near = np.array([beyond[max(0, place - 10) : place + 11].any() for place in range(len(whole))])
-    left = list(sound([whole], LIMITS))
+    left = list(sound(parts, LIMITS))
     np.testing.assert_array_equal(
         np.concatenate([part.theta for part in left], axis=1), whole.theta[:, ~near]
     )
@@ -74,25 +76,3 @@ def test_what_is_left_lies_within_the_limits_and_ten_milliseconds_off() -> None:
         place = round(part.start / part.dt)
         np.testing.assert_array_equal(part.theta, whole.theta[:, place : place + len(part)])
         assert part.continues == (place > 0 and not near[place - 1])
-
-
-def stretches(parts: list[Segment]) -> list[Segment]:
-    """Parts that continue each other as one."""
-    joined: list[Segment] = []
-    for part in parts:
-        if part.continues:
-            joined[-1] = append(joined[-1], part)
-        else:
-            joined.append(part)
-    return joined
-
-
-@pytest.mark.parametrize("size", [1, 7, 64, 700])
-def test_stretches_do_not_depend_on_how_the_segments_were_cut(size: int) -> None:
-    whole = ramp()
-    parts = [whole.part(first, first + size) for first in range(0, len(whole), size)]
-    cut, expected = (stretches(list(sound(one, LIMITS))) for one in (parts, [whole]))
-    assert [one.start for one in cut] == pytest.approx([one.start for one in expected])
-    for one, other in zip(cut, expected, strict=True):
-        np.testing.assert_array_equal(one.theta, other.theta)
-        np.testing.assert_array_equal(one.tau, other.tau)

@@ -13,7 +13,6 @@ from algid.identification.known import (
     model_of,
     prior_of,
     shift_of,
-    torque_constants,
 )
 from algid.model import Model
 from algid.results import Estimate, Result, Status
@@ -85,19 +84,3 @@ def test_a_prior_that_a_result_cannot_give_is_refused_with_what_to_do(weighed: R
         prior_of(lost, model_of(weighed))
     with pytest.raises(ResultError, match="leaves constants undetermined"):
         prior_of(changed(weighed, "parameters", "k4", estimate=None), model_of(weighed))
-
-
-@pytest.mark.parametrize(
-    ("group", "name", "role"), [("parameters", "k6", "unloaded"), ("payload", "l2", "loaded")]
-)
-def test_a_constant_that_is_needed_and_open_is_named(
-    weighed: Result, group: str, name: str, role: str
-) -> None:
-    result = changed(weighed, group, name, estimate=None, status=Status.NOT_IDENTIFIABLE)
-    with pytest.raises(
-        ResultError,
-        match=rf"^r\.json: the result has no {name}; identify it from logs that determine it$",
-    ):
-        torque_constants(result, model_of(result), role, "r.json")  # type: ignore[arg-type]
-    if role == "loaded":
-        assert torque_constants(result, model_of(result), "unloaded", "r.json").size == 9

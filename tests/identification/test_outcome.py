@@ -128,18 +128,6 @@ def test_the_covariance_is_null_where_a_parameter_is_open() -> None:
             assert value == (None if expected is None else pytest.approx(expected))
 
 
-@pytest.mark.parametrize(("statistic", "endogenous"), [(0.5, False), (3.2, None), (7.0, True)])
-def test_endogeneity_is_judged_for_as_many_coefficients_as_a_log_has(
-    statistic: float, endogenous: bool | None
-) -> None:
-    found = summed(replace(fit_of(), endogeneity=statistic)).endogeneity["largest"]
-    assert found.statistic == statistic
-    assert found.p_value == pytest.approx(min(1.0, 7 * 2 * norm.sf(statistic)), rel=1e-9)
-    if endogenous is not None:
-        assert found.endogenous is endogenous
-    assert summed(fit_of()).endogeneity == {}
-
-
 def test_each_log_tells_its_own_estimates() -> None:
     """A log whose information is 4e8 on every coefficient but the last, on which it is none."""
     size, c0 = 7, K
@@ -156,15 +144,6 @@ def test_each_log_tells_its_own_estimates() -> None:
     )
     assert own["k7"].status is Status.NOT_IDENTIFIABLE
     assert own["k7"].estimate is None
-
-
-@pytest.mark.parametrize("known", [0.4, PAYLOAD, 2.0])
-def test_the_torques_gain_is_the_known_mass_over_the_found_one(known: float) -> None:
-    found = summed(fit_of(), payload_mass=known).torque_gain
-    assert found.estimate == pytest.approx(known / PAYLOAD, rel=1e-12)
-    assert found.std == pytest.approx(0.01 * known / PAYLOAD, rel=1e-12)
-    ends = (known / (PAYLOAD * (1 + 0.01 * QUANTILE)), known / (PAYLOAD * (1 - 0.01 * QUANTILE)))
-    assert found.ci95 == pytest.approx(ends, rel=1e-12)
 
 
 def test_a_prediction_without_samples_is_none_and_others_hold_their_sums() -> None:

@@ -124,13 +124,10 @@ def test_an_earlier_result_is_a_prior_by_its_own_covariance(tmp_path: Path) -> N
 
 def test_a_profile_names_it(cad: Path) -> None:
     log = log_of(ARM, "faint", SEED)
-    columns = {"time": log.stamp_ns * 1e-9}
-    for place in range(2):
-        columns |= {f"theta{place + 1}": log.theta[place], f"tau{place + 1}": log.tau[place]}
     profile = {"prior": str(cad), "prior_error": 30}
-    by_profile = algid.identify(columns, profile=profile)
+    by_profile = algid.identify(log, profile=profile)
     assert by_profile.settings["prior"] == str(cad)
-    assert by_profile.parameters == algid.identify(columns, **profile).parameters  # type: ignore[arg-type]
+    assert by_profile.parameters == algid.identify(log, **profile).parameters  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

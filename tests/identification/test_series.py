@@ -37,20 +37,12 @@ DT = 2e-3
 LOADED_K = with_payload(K, CASE.arm.payload_constants(CASE.payload))
 
 
-def moved(
-    k: FloatArray, seed: int, lead: int = 0, start_ns: int = 7_000_000_000
-) -> tuple[Log, FloatArray]:
-    """Four seconds without noise, its torque logged `lead` samples early, and the true velocities
-    (2, N).
-    """
+def moved(k: FloatArray, seed: int, start_ns: int = 7_000_000_000) -> tuple[Log, FloatArray]:
+    """Four seconds without noise, and the true velocities (2, N)."""
     t = DT * np.arange(2001)
     motion = simulate(k, wide_multi_sine(CASE.arm, seed), t)
-    rows = t.size - lead
-    tau = motion.tau[:, lead:]
-    stamps = start_ns + np.rint(t[:rows] * 1e9).astype(np.int64)
-    return Log(stamps, motion.theta[:, :rows], tau, Origin(f"{seed}.csv", "csv", {})), motion.omega[
-        :, :rows
-    ]
+    stamps = start_ns + np.rint(t * 1e9).astype(np.int64)
+    return Log(stamps, motion.theta, motion.tau, Origin(f"{seed}.csv", "csv", {})), motion.omega
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,6 @@ import pytest
 
 import algid
 from algid.arm import FloatArray, with_payload
-from algid.base.errors import SettingError
 from algid.estimators import refined
 from algid.identification.identify import identify
 from algid.log import ChannelReading, Log, Reading
@@ -66,15 +65,6 @@ def test_a_known_payload_tells_the_gain_of_the_torques() -> None:
     l1 = result.payload["l1"]  # no gain changes a length
     assert l1.estimate == pytest.approx(CASE.arm.l1, rel=0.03)
     assert any("says to multiply by 0.09" in warning for warning in result.warnings)
-
-
-def test_without_a_payload_there_is_no_gain_to_tell() -> None:
-    bare = identify(
-        currents(loaded=False), settings=Settings(model="plain", payload_mass=0.5), report=False
-    )
-    assert bare.fit.torque_gain is None
-    with pytest.raises(SettingError, match="--payload-mass: expected greater than or equal to"):
-        Settings(payload_mass=0.0)
 
 
 @pytest.mark.slow

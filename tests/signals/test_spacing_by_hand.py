@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from algid.log import Log, Origin, join
-from algid.signals.spacing import BRIDGE, near_stamps, spaced
+from algid.signals.spacing import near_stamps, spaced
 
 PERIOD = 1e-3
 US = 1000  # ns
@@ -65,12 +65,3 @@ def test_near_is_less_than_three_tenths_of_a_period(step: int, count: int) -> No
     assert near_stamps(stamps, PERIOD) == count
     log = Log(stamps, np.zeros((2, 4)), np.zeros((2, 4)), Origin("log", "test", {}))
     assert len(settled(log)) == 4 - count
-
-
-def test_a_cluster_over_the_seam_of_two_blocks_is_one_and_no_block_is_a_crumb() -> None:
-    us = [*range(0, 40_000, 1000), 39_002, *range(40_000, 80_000, 1000)]
-    log = log_of(us, [one / 1000 for one in us])
-    blocks = list(spaced([log.part(0, 40), log.part(40, 81)], PERIOD))
-    stamps = np.concatenate([block.stamp_ns for block in blocks]) // US
-    assert stamps.tolist() == [*range(0, 39_000, 1000), 39_001, *range(40_000, 80_000, 1000)]
-    assert [len(block) for block in blocks] == [39, 1 + BRIDGE, 40 - BRIDGE - 1, 1]

@@ -116,27 +116,6 @@ def test_few_blocks_of_white_rows_have_no_excess_by_chance(pairs: int, robust: b
     assert false <= binom.isf(1e-3, count, CHANCE)
 
 
-def test_errors_of_a_few_moments_are_in_the_mean_alone() -> None:
-    """As those of a friction's shape, which show where a joint turns back: one cell in 25 is five
-    deviations off.
-    """
-    rng = np.random.default_rng(3)
-    A = np.ones(4000)
-    B = rng.standard_normal(4000) + 5.0 * (np.arange(4000) % 25 == 0)
-    assert excess(A, B, [(0, 4000)], [1]) == pytest.approx(1, abs=0.4)
-    # two neighbouring differences in 25 hold it: 1 + 2 · 5² / (2 · 25)
-    assert excess(A, B, [(0, 4000)], [1], robust=False) == pytest.approx(2, rel=0.1)
-
-
-def test_a_step_between_parts_is_no_excess() -> None:
-    rng = np.random.default_rng(2)
-    A, masses = np.ones(900), np.repeat(rng.normal(0, 20, 30), 30)
-    B = masses + rng.standard_normal(900)
-    assert excess(A, B, [(0, 900)], [5], robust=False) > 100
-    parts = [(first, first + 30) for first in range(0, 900, 30)]
-    assert excess(A, B, parts, robust=False) == 1.0
-
-
 @pytest.mark.parametrize("step", [0.0, 1.0])
 def test_edges_of_a_simulated_log_are_its_own(step: float) -> None:
     rng = np.random.default_rng(5)
