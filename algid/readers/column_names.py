@@ -106,11 +106,14 @@ class Name(NamedTuple):
     """A column's name taken apart; `joint` is a number as text, or the joint's own name.
 
     `unit` is in algid's writing; one that no joint's signal has, such as inch, as it stands.
+    Plain names, of `rank` 0, count before those of state structures, and these before joints' names
+    beside words.
     """
 
     stem: str
     joint: str | None
     unit: str | None
+    rank: int = 0
 
     @property
     def own(self) -> str:
@@ -150,11 +153,30 @@ def take_apart(column: str) -> Name:
         return Name(match[2], match[1], unit)
     if match := _JOINT_PLACED.match(text):
         return Name(match[1], match[2], unit)
-    for pattern, stem, joint in ((_JOINT_FIRST, 2, 1), (_JOINT_LAST, 1, 2)):
+    stem, joint = text, None
+    for pattern, at, number in ((_JOINT_FIRST, 2, 1), (_JOINT_LAST, 1, 2)):
         if match := pattern.match(text):
-            plain = match[stem].replace(" ", "_").replace(".", "_")
-            return Name(plain, match[joint].lstrip("0") or "0", unit)
-    return Name(text, None, unit)
+            stem = match[at].replace(" ", "_").replace(".", "_")
+            joint = match[number].lstrip("0") or "0"
+            break
+    if stem in _STEMS:
+        return Name(stem, joint, unit)
+    if match := _STATE.match(text):  # state.q[0] (libfranka), motor_state[0].q
+        return Name(match["stem"] or match["list"], match["joint"] or match["place"], unit, 1)
+    # a joint and a stem: shoulder_pos, torque elbow; with a number that counts them: dof_pos_2
+    spelled = "_" + re.sub(r"\W+", "_", stem).strip("_") + "_"
+    for known in _STEMS:
+        if spelled.endswith(f"_{known}_"):
+            own = spelled[: -len(known) - 2]
+        elif spelled.startswith(f"_{known}_"):
+            own = spelled[len(known) + 2 :]
+        else:
+            continue
+        words = [word for word in (*_COUNTED.sub("_", own).split("_"), joint) if word]
+        if words and _NO_JOINTS.isdisjoint(words):
+            return Name(known, "_".join(words), unit, 2)
+        break
+    return Name(stem, joint, unit)
 
 
 def units_in_names(columns: Mapping[str, str], stated: Mapping[str, str]) -> dict[str, str]:
@@ -187,9 +209,6 @@ def choose(
 ) -> ChannelChoice:
     """Canonical channels found among `columns`; those not found are left out.
 
-    Plain names, such as ``q1``, come before those of state structures, and these before joints'
-    names beside words, such as ``elbow_pos``.
-
     Parameters
     ----------
     columns : iterable of str
@@ -210,18 +229,16 @@ def choose(
         If a quantity stands there for more than two joints and `joints` does not choose, if there
         are no such joints, or if two columns have one name but for its writing.
     """
-    plain = {column: take_apart(column) for column in columns}
-    wanted = set(needed) - set(named)
-    chosen, parts, tried = _pairs(plain, joints), plain, plain
-    for others in (_of_states, _worded):
-        if wanted <= chosen.keys():
+    names = {column: take_apart(column) for column in columns}
+    wanted, tries = set(needed) - set(named), list[tuple[dict[str, str], dict[str, Name]]]()
+    for rank in range(3):
+        parts = {column: name for column, name in names.items() if name.rank <= rank}
+        tries.append((_pairs(parts, joints), parts))
+        if wanted <= tries[-1][0].keys():
             break
-        tried = plain | others(plain)
-        found = _pairs(tried, joints)
-        if len(wanted & found.keys()) > len(wanted & chosen.keys()):
-            chosen, parts = found, tried
+    chosen, parts = max(tries, key=lambda one: len(wanted & one[0].keys()))
     if joints and needed[0] in wanted - chosen.keys():
-        there = dict.fromkeys(one.own for one in tried.values() if one.joint and one.stem in _STEMS)
+        there = dict.fromkeys(one.own for one in names.values() if one.joint and one.stem in _STEMS)
         raise LookupError(
             f"no columns of the joints {', '.join(joints)}; joints there are: "
             f"{', '.join(list(there)[:16]) or 'none that their names show'}"
@@ -250,7 +267,7 @@ def choose(
     if len(set(own)) < len(own):  # /left/arm/q and /right/arm/q
         own = [name.joint or "" for name in both]
     numbered = len(own) < 2 or all(name.isdecimal() for name in own)
-    if time := time_among(parts):
+    if time := time_among(names):
         chosen["t"] = time
     return ChannelChoice(chosen, None if numbered else (own[0], own[1]))
 
@@ -291,10 +308,9 @@ def _of_joint(of_stem: Mapping[str, str], joint: str) -> list[str]:
     """
     name = joint.strip().lower()
     names = {name, _COUNTED.sub("_", name).strip("_")}
-    plain = {name: take_apart(name)}
-    for part in (*plain.values(), *_worded(plain).values()):
-        if part.joint and part.stem in _STEMS:
-            names.add(part.joint)
+    part = take_apart(name)
+    if part.joint and part.stem in _STEMS:
+        names.add(part.joint)
     if numbered := _NUMBERED.match(name):
         names.add(numbered[1].lstrip("0") or "0")
     columns = []
@@ -315,7 +331,6 @@ _NO_NAMES = frozenset(
 def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, str]:
     """Angle columns by joint of the joints that are not read, named alike those in `angles`."""
     parts = {column: take_apart(column) for column in columns}
-    parts |= _worded(parts)
     read = [parts[column] for column in angles]
     joints = {name.joint for name in read}
     kinds = {(name.stem, name.topic) for name in read if name.stem not in _NO_NAMES}
@@ -324,38 +339,6 @@ def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, s
         if name.joint and name.joint not in joints and (name.stem, name.topic) in kinds:
             others[name.own] = column
     return others
-
-
-def _worded(parts: Mapping[str, Name]) -> dict[str, Name]:
-    """Parts of columns named by a joint and a stem: ``shoulder_pos``, ``torque elbow``.
-
-    A number behind them counts the joints: ``dof_pos_2``, ``arm_torque_2``.
-    """
-    by_words = {}
-    for column, name in parts.items():
-        if name.stem in _STEMS or not (name.joint is None or name.joint.isdecimal()):
-            continue
-        text = "_" + re.sub(r"\W+", "_", name.stem).strip("_") + "_"
-        for stem in _STEMS:
-            first, last = text.startswith(f"_{stem}_"), text.endswith(f"_{stem}_")
-            if first or last:
-                joint = text[: -len(stem) - 2] if last else text[len(stem) + 2 :]
-                words = [word for word in _COUNTED.sub("_", joint).split("_") if word]
-                words += [name.joint] if name.joint else []
-                if words and _NO_JOINTS.isdisjoint(words):
-                    by_words[column] = name._replace(stem=stem, joint="_".join(words))
-                break
-    return by_words
-
-
-def _of_states(parts: Mapping[str, Name]) -> dict[str, Name]:
-    """Parts of columns of state structures: ``state.q[0]`` (libfranka), ``motor_state[0].q``."""
-    states = {}
-    for column, name in parts.items():
-        if len(column) <= LIMITS.name_letters and (one := _STATE.match(column.strip().lower())):
-            stem, joint = one["stem"] or one["list"], one["joint"] or one["place"]
-            states[column] = name._replace(stem=stem, joint=joint)
-    return states
 
 
 def _only_torque(parts: Mapping[str, Name], angle: str | None) -> str | None:
