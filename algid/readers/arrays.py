@@ -23,7 +23,7 @@ from algid.base.limits import LIMITS
 from algid.base.text import repeated
 from algid.notices import Notice
 from algid.readers.column_names import TIMES
-from algid.readers.flat import as_log_error
+from algid.readers.table import as_log_error
 from algid.readers.table_cells import ATTRIBUTES, BATCH_ROWS, TableFile
 
 if TYPE_CHECKING:

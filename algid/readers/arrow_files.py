@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from algid.log import CANONICAL_COLUMNS, KEY, Companion, loads
 from algid.notices import Notice
-from algid.readers.flat import as_log_error
+from algid.readers.table import as_log_error
 from algid.readers.table_cells import BATCH_ROWS, TableFile, attributed
 
 if TYPE_CHECKING:

@@ -20,10 +20,10 @@ from algid.base.errors import LogError
 from algid.base.files import read_text
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.notices import Notice
-from algid.readers.flat import as_log_error
 from algid.readers.mcap import mcap_file
 from algid.readers.messages.message_file import MessageChannel, MessageFile, Messages
 from algid.readers.messages.offer import MessageLog
+from algid.readers.table import as_log_error
 
 if TYPE_CHECKING:
     import sqlite3

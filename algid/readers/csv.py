@@ -15,7 +15,7 @@ from algid.base.text import visible
 from algid.log import Companion, loads
 from algid.notices import Notice
 from algid.readers.dialect import Dialect, detect, head_of, pieces
-from algid.readers.flat import as_log_error
+from algid.readers.table import as_log_error
 from algid.readers.table_cells import TableFile
 
 if TYPE_CHECKING:

@@ -9,7 +9,6 @@ float64 seconds since 1970 resolve 0.24 µs, so whole and fractional seconds are
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -64,31 +63,6 @@ INDEX = "__index_level_0__"
 """What pandas calls an index without a name where a frame becomes Arrow or Parquet."""
 _AS_IN_A_PROFILE = words("zero second_angle drive passive signs offsets start end segment")
 """Of a reading."""
-
-
-@contextmanager
-def as_log_error(path: object, kind: str, mend: str = "copy it again") -> Iterator[None]:
-    """Turn what a library raises about a file into a `LogError` that says how to `mend` it.
-
-    A `LogError` passes. A panic of polars is no Exception.
-
-    Raises
-    ------
-    LogError
-        If anything is raised within.
-    """
-    try:
-        yield
-    except LogError:
-        raise
-    except BaseException as error:
-        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
-            raise
-        reason = str(error).partition("\n")[0][:200]
-        raise LogError(
-            f"{path}: the {kind} file is damaged or not one that can be read "
-            f"({type(error).__name__}: {reason}); {mend}"
-        ) from error
 
 
 def offer_table(table: TableFile, profile: Profile) -> Offered:

@@ -28,8 +28,8 @@ from algid.base.limits import LIMITS
 from algid.base.runtime import ahead
 from algid.log import KEY, IntArray, loads
 from algid.notices import Notice
-from algid.readers.flat import as_log_error
 from algid.readers.messages.message_file import MessageChannel, MessageFile, Messages, gather
+from algid.readers.table import as_log_error
 
 _FRAME = struct.Struct("<BQ")
 _INDEX = struct.Struct("<BQH4x")

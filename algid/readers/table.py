@@ -6,6 +6,7 @@ Samples are in the file's own units, not yet converted.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.base.errors import LogError
 from algid.base.names import concatenated, rows_of
 from algid.base.text import joined
 from algid.log import IntArray, Truth
@@ -25,6 +27,31 @@ JOINT_CHANNELS = ("theta1", "theta2", "tau1", "tau2")
 VELOCITIES = ("omega1", "omega2")
 REFERENCES = ("q_des1", "q_des2")
 CHANNELS = JOINT_CHANNELS + VELOCITIES + REFERENCES
+
+
+@contextmanager
+def as_log_error(path: object, kind: str, mend: str = "copy it again") -> Iterator[None]:
+    """Turn what a library raises about a file into a `LogError` that says how to `mend` it.
+
+    A `LogError` passes. A panic of polars is no Exception.
+
+    Raises
+    ------
+    LogError
+        If anything is raised within.
+    """
+    try:
+        yield
+    except LogError:
+        raise
+    except BaseException as error:
+        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
+            raise
+        reason = str(error).partition("\n")[0][:200]
+        raise LogError(
+            f"{path}: the {kind} file is damaged or not one that can be read "
+            f"({type(error).__name__}: {reason}); {mend}"
+        ) from error
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,9 +14,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-
-from algid.base.arrow import column_of, numbers_of, whole_column
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.text import repeated
@@ -24,8 +21,10 @@ from algid.log import Companion
 from algid.notices import Notice
 from algid.readers.annotations import BAD, GOOD, GROUPS, object_in, several, units_in
 from algid.readers.column_names import STEMS
+from algid.readers.table import as_log_error
 
 if TYPE_CHECKING:
+    import polars as pl
     import pyarrow as pa
 
 BATCH_ROWS = 1 << 14
@@ -78,25 +77,21 @@ class TableFile:
     said: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cell:
-    """A number of each row: a column's, or one within its lists and structures.
+    """A number of each row: a column's, or what an `expression` of polars makes of `columns`.
 
-    `steps` are the places in these; `label` is the column with the joints' names, if the number of
-    `joint` stands beside its name; `fills` are values that stand for a missing one; `unit` is what
-    the column's own attributes state.
+    `joint` is the one whose name stands beside the number; `unit` is what the column's own
+    attributes state.
     """
 
-    column: str
+    columns: tuple[str, ...]
     type: pa.DataType
-    steps: tuple[int, ...] = ()
-    label: str = ""
+    expression: pl.Expr | None = None
     joint: str = ""
-    fills: tuple[float, ...] = ()
-    scale: float = 1.0
-    offset: float = 0.0
     unit: str = ""
     topic: ClassVar[str] = ""
+    column: ClassVar[str] = ""
 
     @property
     def is_number(self) -> bool:
@@ -104,7 +99,7 @@ class Cell:
         import pyarrow as pa
 
         kind = self.type.value_type if pa.types.is_dictionary(self.type) else self.type
-        return _is_plain(kind) or pa.types.is_decimal(kind)
+        return _is_plain(kind) or pa.types.is_decimal128(kind)
 
     @property
     def is_clock(self) -> bool:
@@ -114,84 +109,52 @@ class Cell:
         kind = self.type
         return pa.types.is_timestamp(kind) or pa.types.is_duration(kind) or pa.types.is_time(kind)
 
-    def of(self, batch: pa.RecordBatch) -> pa.Array:
-        """The numbers of a batch: integers, floats, or for a clock ticks of its type."""
-        import pyarrow as pa
+    @property
+    def is_column(self) -> bool:
+        """Whether it is a column as it stands."""
+        return self.expression is None and (_is_plain(self.type) or self.is_clock)
 
-        values = batch.column(self.column)
-        if self.label:
-            values = self._beside_its_name(values, batch.column(self.label))
-        changed = bool(self.fills) or (self.scale, self.offset) != (1.0, 0.0)
-        if self.steps or changed:
-            import pyarrow.compute as pc  # plain numbers need not wait for it
-        for step in self.steps:
-            if pa.types.is_struct(values.type):
-                values = pc.struct_field(values, [step])
-            else:
-                numbers = values.flatten()
-                sizes = whole_column(pc.list_value_length(values).fill_null(0))
-                size = sizes[0] if len(sizes) else 0
-                if (
-                    size > step
-                    and np.all(sizes == size)
-                    and not numbers.null_count
-                    and _is_plain(numbers.type)
-                ):
-                    values = column_of(whole_column(numbers)[step::size])
-                else:
-                    one = pc.list_slice(values, step, step + 1, return_fixed_size_list=True)
-                    values = pc.if_else(values.is_valid(), one.values, None)
-        if self.is_clock:
-            values = values.view(pa.int32() if self.type.bit_width == 32 else pa.int64())
-        elif not _is_plain(values.type):
-            if pa.types.is_dictionary(values.type):
-                values = values.dictionary_decode()
-            if pa.types.is_decimal128(values.type):  # Arrow rounds twice
-                import polars as pl
-
-                values = pl.Series(pl.from_arrow(values)).cast(pl.Float64).to_arrow()
-            values = values.cast(pa.float64())
-        if not changed:
-            return values
-        values = values.cast(pa.float64())
-        for fill in self.fills:
-            missing = pc.is_nan(values) if np.isnan(fill) else pc.equal(values, fill)
-            values = pc.if_else(missing, None, values)
-        return pc.add(pc.multiply(values, self.scale), self.offset)
-
-    def _beside_its_name(self, values: pa.Array, names: pa.Array) -> pa.Array:
-        import polars as pl
-
-        frame = pl.DataFrame({"values": pl.from_arrow(values), "names": pl.from_arrow(names)})
-        mine = pl.col("names").list.eval(pl.element() == self.joint)
-        first = pl.when(mine.list.any()).then(mine.list.arg_max())
-        number = pl.col("values").cast(pl.List(pl.Float64)).list.get(first, null_on_oob=True)
-        return frame.select(number).to_series().to_arrow()
+    @property
+    def taken(self) -> pl.Expr:
+        """What takes it out of the columns."""
+        own = _whole(self.columns[0]) if self.expression is None else self.expression
+        return own if _is_plain(self.type) or self.is_clock else own.cast(float)
 
 
 def cell_batches(
     table: TableFile, cells: Mapping[str, Cell], names: Sequence[str], most: int | None
 ) -> Iterator[list[pa.Array]]:
-    """Some cells of each batch of rows; of rows that a flag takes out each is null."""
+    """Some cells of each batch of rows: integers, floats, or for a clock ticks of its type.
+
+    Of rows that a flag takes out each is null.
+    """
     import pyarrow as pa
 
     chosen = [cells[name] for name in names]
-    columns = [one.column for one in chosen] + [one.label for one in chosen if one.label]
-    flags = []
+    columns = [column for one in chosen for column in one.columns]
+    bad, made = list[Any](), list[Any]()
     for name in [one for one in cells if one.lower() in GOOD or one.lower() in BAD]:
-        kind = cells[name].type
-        if pa.types.is_boolean(kind) or _is_plain(kind) or is_text(kind):
-            flags.append(name)
-    for batch in table.batches(list(dict.fromkeys((*columns, *flags))), most):
-        arrays = [cell.of(batch) for cell in chosen]
-        flagged = np.zeros(batch.num_rows, np.bool_)
-        for name in flags:
-            flagged |= _flag(batch.column(name)) == (name.lower() not in GOOD)
-        if flagged.any():
-            import pyarrow.compute as pc
+        flag, kind = _whole(name), cells[name].type
+        if is_text(kind):
+            flag = ~flag.str.strip_chars().str.to_lowercase().is_in(_NO)
+        elif not (pa.types.is_boolean(kind) or _is_plain(kind)):
+            continue
+        columns.append(name)
+        bad.append(flag.cast(float).ne(0).fill_null(value=True) ^ (name.lower() in GOOD))
+    if bad or not all(one.is_column for one in chosen):
+        import polars as pl  # plain columns need not wait for it
 
-            mask = pa.array(flagged)
-            arrays = [pc.if_else(mask, pa.scalar(None, one.type), one) for one in arrays]
+        for place, one in enumerate(chosen):
+            value = pl.when(~pl.any_horizontal(bad)).then(one.taken) if bad else one.taken
+            made.append(value.alias(str(place)))
+    for batch in table.batches(list(dict.fromkeys(columns)), most):
+        arrays = [batch.column(one.columns[0]) for one in chosen]
+        if made:
+            arrays = [series.to_arrow() for series in pl.DataFrame(batch).select(made)]
+        for place, one in enumerate(chosen):
+            if one.is_clock:
+                ticks = pa.int32() if one.type.bit_width == 32 else pa.int64()
+                arrays[place] = arrays[place].cast(one.type).view(ticks)
         yield arrays
 
 
@@ -212,7 +175,12 @@ def cells_of(table: TableFile) -> dict[str, Cell]:
             f"{table.path}: the column {twice[0][:80]!r} stands in the file twice; rename one"
         )
     nested = [one.name for one in table.schema if is_list(one.type) or pa.types.is_struct(one.type)]
-    first = next(table.batches(nested, BATCH_ROWS), None) if nested else None
+    frame: Any = None
+    if nested:
+        import polars as pl
+
+        with as_log_error(table.path, table.kind):
+            frame = pl.DataFrame(next(table.batches(nested, BATCH_ROWS), None))
     metadata = decoded(table.schema.metadata)
     label, joints = _spoken(table)
     cells: dict[str, Cell] = {}
@@ -224,17 +192,23 @@ def cells_of(table: TableFile) -> dict[str, Cell]:
             continue
         if joints and is_list(one.type) and _is_quantity(one.name):
             for joint in joints[: LIMITS.joints]:
-                cell = Cell(one.name, one.type.value_type, label=label, joint=joint)
+                beside = _lists(_whole(label), table.schema.field(label).type)
+                own = beside.eval(pl.element() == joint).list
+                at = pl.when(own.any()).then(own.arg_max())
+                number = _lists(_whole(one.name), one.type).get(at, null_on_oob=True)
+                cell = Cell((one.name, label), one.type.value_type, number, joint)
                 cells[f"/{label}/{joint}/{one.name}"] = _marked(table.path, cell, said)
             continue
         named = [text[key] for text in (own, metadata) for key in LABELS if key in text]
         names = next(filter(None, map(_names, named)), [])
-        values = first.column(one.name) if first and one.name in nested else None
-        for name, steps, kind in _within(one.name, one.type, values):
+        parts: list[Any] = [(one.name, one.type, None)]
+        if one.name in nested:
+            parts = [*_within(one.name, one.type, _whole(one.name), frame)]
+        for name, kind, part in parts:
             place = _PLACE.fullmatch(name)
             if place and _is_quantity(place[1]) and int(place[2]) < len(names):
                 name = f"/joint_names/{names[int(place[2])]}/{place[1]}"
-            cells[name] = _marked(table.path, Cell(one.name, kind, steps), said)
+            cells[name] = _marked(table.path, Cell((one.name,), kind, part), said)
             if len(cells) > LIMITS.columns:
                 raise LogError(
                     f"{table.path}: more than {LIMITS.columns} columns; expected a log of an arm"
@@ -242,26 +216,36 @@ def cells_of(table: TableFile) -> dict[str, Cell]:
     return cells
 
 
-def _within(
-    name: str, kind: pa.DataType, values: pa.Array | None, steps: tuple[int, ...] = ()
-) -> Iterator[tuple[str, tuple[int, ...], pa.DataType]]:
-    """Names, steps and types of the cells of a column, of which some `values` are given."""
+def _whole(column: str) -> pl.Expr:
+    """A column by its name, which is no pattern."""
+    from polars import selectors
+
+    return selectors.by_name(column).as_expr()
+
+
+def _lists(values: pl.Expr, kind: pa.DataType) -> Any:
+    """What polars does with lists, of a fixed size too."""
     import pyarrow as pa
 
-    if not (pa.types.is_struct(kind) or is_list(kind)):
-        yield name, steps, kind
-        return
-    import pyarrow.compute as pc  # a plain table need not wait for it
+    return (values.arr.to_list() if pa.types.is_fixed_size_list(kind) else values).list
+
+
+def _within(
+    name: str, kind: pa.DataType, values: pl.Expr, frame: pl.DataFrame
+) -> Iterator[tuple[str, pa.DataType, pl.Expr]]:
+    """Names, types and `values` of the cells of a column, of which a `frame` has some rows."""
+    import pyarrow as pa
 
     if pa.types.is_struct(kind):
         for place, one in enumerate(kind):
-            inner = values and pc.struct_field(values, [place])
-            yield from _within(f"{name}.{one.name}", one.type, inner, (*steps, place))
+            yield from _within(f"{name}.{one.name}", one.type, values.struct[place], frame)
+    elif is_list(kind):
+        lists = _lists(values, kind)
+        for place in range(min(frame.select(lists.len().max()).item() or 0, LIMITS.list_cells)):
+            number = lists.get(place, null_on_oob=True)
+            yield from _within(f"{name}[{place}]", kind.value_type, number, frame)
     else:
-        size = values and pc.max(pc.list_value_length(values)).as_py()
-        for place in range(min(size or 0, LIMITS.list_cells)):
-            inner = values and values.flatten()
-            yield from _within(f"{name}[{place}]", kind.value_type, inner, (*steps, place))
+        yield name, kind, values
 
 
 _PLACE = re.compile(r"(.+)\[(\d+)\]")
@@ -313,14 +297,16 @@ def _marked(path: str, cell: Cell, said: Mapping[str, str]) -> Cell:
                 numbers[key] = float(said[key])
             except ValueError as error:
                 raise LogError(
-                    f"{path}: {key} of the column {cell.column!r} is {said[key][:40]!r}; "
+                    f"{path}: {key} of the column {cell.columns[0]!r} is {said[key][:40]!r}; "
                     "expected a number"
                 ) from error
     if not numbers:
         return cell
     scale, offset = numbers.pop("scale_factor", 1.0), numbers.pop("add_offset", 0.0)
-    fills = tuple(numbers.values())
-    return replace(cell, type=pa.float64(), fills=fills, scale=scale, offset=offset)
+    known = cell.taken.cast(float)
+    for fill in numbers.values():
+        known = known.replace(fill, None)
+    return replace(cell, type=pa.float64(), expression=known * scale + offset)
 
 
 def units_of(table: TableFile, cells: Mapping[str, Cell]) -> dict[str, str]:
@@ -404,13 +390,6 @@ def _is_plain(kind: pa.DataType) -> bool:
     import pyarrow as pa
 
     return pa.types.is_integer(kind) or pa.types.is_floating(kind)
-
-
-def _flag(values: pa.Array) -> Any:
-    """Whether flags (N,) are set: numbers but zero, texts but a no; NaN where one is missing."""
-    if is_text(values.type):
-        return np.array([str(text).strip().lower() not in _NO for text in values.to_pylist()])
-    return numbers_of(values) != 0
 
 
 def _values(table: TableFile, name: str) -> Iterator[Any]:
