@@ -18,6 +18,7 @@ import pytest
 import algid
 from algid.base.errors import LogError, OutputError, SettingError
 from algid.log import ChannelReading, Reading
+from algid.profile import Torque
 from algid.results import Result, write_result
 from tests.report.folders import build
 
@@ -211,7 +212,7 @@ def test_settings_of_a_reading_hold_for_arrays_as_for_a_file(tmp_path: Path) -> 
     other = algid.Log.from_arrays(log.t, np.degrees(-(log.theta + hanging)), -log.tau)
     said: dict[str, Any] = {
         "zero": "hanging",
-        "angle_unit": "deg",
+        "angle_unit": "degrees",
         "signs": (-1, -1),
         "start": 0.5,
     }
@@ -237,6 +238,13 @@ def test_settings_of_a_reading_hold_for_arrays_as_for_a_file(tmp_path: Path) -> 
     assert algid.identify(read, estimator="weak", end=1.0).log.rows == 1001
 
 
+def test_settings_are_what_their_result_holds_of_them() -> None:
+    assert not algid.Settings().constrain
+    turning = algid.Settings(estimator="paper", poles="-80+20j,-80-20j,-80,-90,-90,-70")  # type: ignore[arg-type]
+    assert algid.Settings.of(turning.as_json()) == turning
+    assert algid.Profile(tau1=Torque(kp=0.5, kd=0.0)).tau1.kp == 0.5
+
+
 def test_what_was_said_of_arrays_holds_of_later_ones() -> None:
     log, loaded = algid.synthesise("case1", duration=2.0, torque="wide", torque_noise=1e-2)
     hanging = np.array([[np.pi / 2], [0.0]])
@@ -249,6 +257,7 @@ def test_what_was_said_of_arrays_holds_of_later_ones() -> None:
     assert found.payload["m_p"].estimate == pytest.approx(0.3515, rel=0.05)
     validated = algid.validate(arm, one)
     assert (min(validated.total.r2) > 0.999, validated.warnings) == (True, ())
+    assert min(algid.validate(arm, one, start=0.2).total.r2) > 0.999  # beside what is said anew
     left = arm.predict(one).select(pl.col("tau1") - pl.col("tau1_predicted")).to_series()
     assert left.fill_nan(None).std() < 0.02 * np.std(log.tau[0])
     (stretch,) = algid.track(two, arm, l1=0.1626, l2=0.1232).track.stretches

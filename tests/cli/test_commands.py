@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import math
 import re
+import shlex
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 import pytest
 
+from algid.results import read_result
 from tests.processes import Outcome
 
 
@@ -73,10 +75,20 @@ def test_a_failed_result_ends_with_three_and_says_what_to_run(logs: Path, tmp_pa
     assert found.code == 3
     lines = found.out.splitlines()
     assert lines[0].startswith("Failed: ")
+    assert "do not use these\nnumbers." in found.out
     assert "[UNKNOWN_CAUSE]" in found.out
     said = found.out.replace(" \\\n    ", " ").splitlines()  # a long command goes on below
     assert f"Run first: algid inspect {tmp_path / 'wrong.csv'}" in said
     assert " OK " not in found.out
+
+
+def test_a_result_has_the_name_and_the_call_that_were_typed(logs: Path, tmp_path: Path) -> None:
+    flags = ("--name", "monday", "--no-report", "--estimator", "weak")
+    call = ("identify", logs / "case1-unloaded.csv", "-o", tmp_path, *flags)
+    found = Outcome(*call)
+    assert found.code == 0, found.err
+    typed = read_result(tmp_path / "monday.algid").settings["command"]
+    assert typed == shlex.join(map(str, ("algid", *call)))
 
 
 def test_how_a_log_was_read_is_reused_and_compared(logs: Path, tmp_path: Path) -> None:
