@@ -186,6 +186,10 @@ class Notice:
             return self.text
         return f"{self.text}: {self.advice}"
 
+    def __str__(self) -> str:
+        """Code and words."""
+        return f"{self.code}: {self.sentence}"
+
     def of(self, *logs: str) -> Notice:
         """The same of those logs."""
         return replace(self, logs=logs)

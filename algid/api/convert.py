@@ -11,7 +11,7 @@ from algid.api import Answer
 from algid.api.options import LogOptions, ProfileLike, meant, verb
 from algid.base.errors import exit_of
 from algid.notices import Notice, Remedy, lossy
-from algid.settings import DEFAULTS, OF_BOTH
+from algid.settings import OF_BOTH
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
@@ -78,11 +78,9 @@ def convert(
     own = meant(profile, options)
     reader = open_log(source, own)
     notices: list[Notice] = []
-    left: dict[str, Any] = {}  # what samples in SI units do not hold
-    for name in OF_BOTH if own is not None else ():
-        value = getattr(own, name)
-        if value not in (DEFAULTS[name], None, "raw", "current"):  # a current is a torque by now
-            left[name] = value
+    said = {} if own is None else own.model_dump(include={*OF_BOTH}, exclude_defaults=True)
+    # what samples in SI units do not hold; a current is a torque by now
+    left = {name: one for name, one in said.items() if one not in ("raw", "current", "observer")}
     if left:
         numbers = {"case": "kept", "said": ", ".join(left)}
         again = Remedy(left, "where the file is used")
@@ -104,9 +102,8 @@ def convert(
 
 def answer(notices: list[Notice], given: Mapping[str, Any]) -> Answer:
     """What was noticed, and the file; 4 where samples are missing."""
-    remarks = [f"{one.code}: {one.clause}" for one in notices] + [f"wrote {given['out']}"]
-    ended = exit_of(failed=False, lost=lossy(notices))
-    return Answer(remarks=remarks, exit=ended)
+    remarks = [*map(str, notices), f"wrote {given['out']}"]
+    return Answer(remarks=remarks, exit=exit_of(failed=False, lost=lossy(notices)))
 
 
 write_log = verb(writers.write_log)

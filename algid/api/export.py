@@ -131,20 +131,17 @@ def export(
 
     if to in ("csv", "parquet") and draws is None:
         raise SettingError(f"{flag('to')} {to}: a table of draws; say how many by {flag('draws')}")
-    said = {"l1": l1, "l2": l2, "m1": m1, "m2": m2, "rotor1": rotor1}
+    said, file = {"l1": l1, "l2": l2, "m1": m1, "m2": m2, "rotor1": rotor1}, called(result)
     knowns = {name: value for name, value in said.items() if value is not None}
     if flange is not None and to != "payload":
         raise SettingError(f"{flag('flange')}: {to} holds no flange; leave it out")
     path = None if out is None else Path(out)
     if path == Path() or (path is not None and path.is_dir() and draws is None):
-        name = stem_of(Path(called(result)))
-        if draws is not None:
-            path /= f"{name}-draws"
-        elif to == "payload":
-            path /= f"{name}-payload.yaml"
-        else:  # a module of Python is imported by its name
-            path /= (re.sub(r"\W", "_", name) if to == "python" else name) + SUFFIXES[to]
-    read, file = opened(result), called(result)
+        name = stem_of(Path(file))
+        if to == "python" and draws is None:  # a module is imported by its name
+            name = re.sub(r"\W", "_", name)
+        path /= name + ("-draws" if draws is not None else SUFFIXES.get(to, "-payload.yaml"))
+    read = opened(result)
     if draws is not None:
         from algid.exports.draws import drawn_files
 

@@ -47,12 +47,11 @@ def _pairs(given: Any) -> Any:
     return [part.split("=") for part in given.split(",")] if isinstance(given, str) else given
 
 
-_Angle = Annotated[float, within(PHYSICAL.angle)]
-_Speed = Annotated[float, within(PHYSICAL.speed)]
+_Start = Annotated[float, within(PHYSICAL.speed)]
 _Positive = Annotated[float, within((0, PHYSICAL.duration[1]))]
 State = Annotated[
     Sequence[float] | str,
-    Option(check=Annotated[tuple[_Angle, _Angle, _Speed, _Speed], BeforeValidator(parts_of)]),
+    Option(check=Annotated[tuple[_Start, _Start, _Start, _Start], BeforeValidator(parts_of)]),
 ]
 Schedule = Annotated[
     Sequence[tuple[float, float]] | str,

@@ -127,7 +127,7 @@ def run_task(task: Task) -> JobRecord | str:
         estimator=result.estimator,
         verdict=judged.grade,
         headline=judged.headline,
-        reasons=tuple(f"{one.code}: {one.sentence}" for one in judged.reasons),
+        reasons=tuple(map(str, judged.reasons)),
         command=judged.command,
         estimates={
             name: (one.estimate, one.std, one.status.value)

@@ -140,11 +140,10 @@ def _parameter(one: Option) -> click.Parameter:
         "type": click.Path(path_type=Path) if kind is Path else kind,
         "metavar": "WORD" if one.words else VALUES.get(one.name, KINDS.get(kind, "TEXT")),
         "required": required,
+        "shell_complete": partial(_completed, one),
     }
     if one.default and not required:
         said["default"] = one.default
-    if one.words or one.suggested:
-        said["shell_complete"] = partial(_completed, one)
     if one.panel == ARGUMENTS:
         said["metavar"] = f"{name.removesuffix('S')}..." if many else name
         return click.Argument([one.name], nargs=-1 if many else 1, **said)

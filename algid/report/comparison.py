@@ -21,7 +21,7 @@ from algid.report.plot import down
 from algid.report.render import page
 from algid.report.tables import settings_of
 from algid.results import Result
-from algid.results.rows import row_of
+from algid.results.rows import rows_of
 
 FIRST = "{0.name} | {1} | {0.with_half} |  | {0.unit} | {0.status} | "
 OTHER = "{0.name} | {1} | {0.with_half} | {2:+.1f} | {0.unit} | {0.status} | {3}"
@@ -91,7 +91,8 @@ class Comparison:
         for place, name in enumerate(self.names):
             for log, (label, result) in enumerate(zip(self.labels, self.results, strict=True)):
                 if name in result.estimates:
-                    row, far = row_of(name, result.estimates[name]), self.sigma[log, place]
+                    row = next(rows_of(result, {name: result.estimates[name]}))
+                    far = self.sigma[log, place]
                     off = percent(numbers[log, place] - numbers[0, place], numbers[0, place], 3)
                     estimates.append(cells(OTHER if log else FIRST, row, label, far, off))
         for name, values in self.settings.items():

@@ -364,12 +364,12 @@ class Result(_Model):
     @property
     def warnings(self) -> list[str]:
         """What makes the result doubtful, of logs and fit: codes and words."""
-        return list(map(_line, warnings_of(self.notices)))
+        return list(map(str, warnings_of(self.notices)))
 
     @property
     def notes(self) -> list[str]:
         """How things were read and done: codes and words."""
-        return list(map(_line, notes_of(self.notices)))
+        return list(map(str, notes_of(self.notices)))
 
     @property
     def logs(self) -> list[LogSummary]:
@@ -445,11 +445,6 @@ class Result(_Model):
         """Whose estimate it is, and of which logs."""
         others = f" and {len(self.more_logs)} more" if self.more_logs else ""
         return f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{others}"
-
-
-def _line(notice: Notice) -> str:
-    """Code and words of a notice."""
-    return f"{notice.code}: {notice.sentence}"
 
 
 def result_schema() -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -46,26 +46,22 @@ def known_truth(result: Result) -> dict[str, float]:
     return truth | result.truth
 
 
-def rows_of(result: Result, estimates: Mapping[str, Estimate]) -> list[EstimateRow]:
-    """A row an estimate, in their order."""
-    truth = known_truth(result)
-    return [row_of(name, one, truth.get(name)) for name, one in estimates.items()]
-
-
-def row_of(name: str, found: Estimate, truth: float | None = None) -> EstimateRow:
-    """The row of one estimate beside the truth, where that is known."""
-    value, half, error = found.estimate, found.half, ABSENT
-    if value is not None and truth:
-        off = 100 * (value - truth) / abs(truth)
-        error = f"{off:+.2g}" if abs(off) >= LEAST_ERROR else f"<{LEAST_ERROR:g}"
-    return EstimateRow(
-        name=visible(name),
-        value=resolved(value, found.std),
-        half=significant(half, 2),
-        share=percent(half, value),
-        unit=unit_text(found.unit),
-        status=found.status.value,
-        truth=significant(truth, max(digits_of(value, found.std), 5)),
-        error=error,
-        meaning=PARAMETERS[name].meaning if name in PARAMETERS else ABSENT,
-    )
+def rows_of(result: Result, estimates: Mapping[str, Estimate]) -> Iterator[EstimateRow]:
+    """A row an estimate, in their order, beside the truth, where that is known."""
+    known = known_truth(result)
+    for name, found in estimates.items():
+        value, half, error, truth = found.estimate, found.half, ABSENT, known.get(name)
+        if value is not None and truth:
+            off = 100 * (value - truth) / abs(truth)
+            error = f"{off:+.2g}" if abs(off) >= LEAST_ERROR else f"<{LEAST_ERROR:g}"
+        yield EstimateRow(
+            name=visible(name),
+            value=resolved(value, found.std),
+            half=significant(half, 2),
+            share=percent(half, value),
+            unit=unit_text(found.unit),
+            status=found.status.value,
+            truth=significant(truth, max(digits_of(value, found.std), 5)),
+            error=error,
+            meaning=PARAMETERS[name].meaning if name in PARAMETERS else ABSENT,
+        )

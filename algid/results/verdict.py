@@ -110,7 +110,7 @@ def _broken_bounds(result: Result) -> list[Notice]:
     broken = [] if result.fit is None else result.fit.broken_bounds
     notices = []
     for one in sorted(broken, key=lambda one: -(one.distance_sigma or 0.0)):
-        distance = significant(one.distance_sigma, 2) if one.distance_sigma else ""
+        distance = one.distance_sigma and significant(one.distance_sigma, 2)
         numbers = {"bound": visible(one.bound), "value": one.value, "distance": distance}
         notices.append(Notice("BROKEN_BOUND", numbers={"case": "free"} | numbers))
     return notices
