@@ -37,6 +37,9 @@ class AlgidError(Exception):
 class LogError(AlgidError):
     """A log cannot be read, or does not hold what was asked of it."""
 
+    is_named = False
+    """Whether the text begins with the log's name."""
+
 
 class SettingError(AlgidError):
     """A flag, a profile, a case or an arm file is wrong."""

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
-from algid.base.errors import AlgidError, Exit, text_of
+from algid.base.errors import AlgidError, Exit, LogError, text_of
 from algid.guard import TRACEBACK, reading
 from algid.options import flag
 
@@ -26,11 +26,24 @@ _LONGEST_REASON = 200
 def during(stage: str, file: object) -> Iterator[None]:
     """Note on an exception from within the block what was being done, and with which file.
 
+    A `LogError` begins with the file's name then.
+
     Whoever guards the process knows meanwhile that the file is being read.
+
+    Raises
+    ------
+    LogError
+        If one is raised within.
     """
     try:
         with reading(str(file)):
             yield
+    except LogError as error:
+        named = f"{file}: ", f"{file}/", f"{str(file)!r}: "
+        if not (error.is_named or str(error).startswith(named)):
+            error.args = (f"{file}: {error}",)
+        error.is_named = True
+        raise
     except _MEANT:
         raise
     except BaseException as error:  # a panic in a library of Rust is no Exception

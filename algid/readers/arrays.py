@@ -45,28 +45,25 @@ def open_arrays(path: Path, kind: str) -> TableFile:
     """
     readers = {"npz": ("NumPy", _of_npz), "mat": ("MATLAB", _of_mat), "hdf5": ("HDF5", _of_hdf5)}
     title, read = readers[kind]
-    _refuse_large(path, path.stat().st_size)
+    _refuse_large(path.stat().st_size)
     with as_log_error(path, title):
         return of_arrays(str(path), kind, *read(path))
 
 
-def _refuse_large(path: Path, size: int) -> None:
+def _refuse_large(size: int) -> None:
     if size > LIMITS.whole_bytes:
         raise LogError(
-            f"{path}: what is more than 1 GiB, packed or not, is not read as a whole; save it as "
-            "Parquet"
+            "what is more than 1 GiB, packed or not, is not read as a whole; save it as Parquet"
         )
 
 
 def _of_npz(path: Path) -> Read:
     arrays: Arrays = {}
     with zipfile.ZipFile(path) as archive:
-        _refuse_large(path, sum(entry.file_size for entry in archive.infolist()))
+        _refuse_large(sum(entry.file_size for entry in archive.infolist()))
         twice = repeated(archive.namelist())
         if twice:
-            raise LogError(
-                f"{path}: the array {twice[0]!r} stands in the archive twice; save it again"
-            )
+            raise LogError(f"the array {twice[0]!r} stands in the archive twice; save it again")
         for name in archive.namelist():
             with archive.open(name) as stream:
                 arrays[name.removesuffix(".npy")] = np.lib.format.read_array(
@@ -74,7 +71,7 @@ def _of_npz(path: Path) -> Read:
                 )
                 if stream.read(1):
                     raise LogError(
-                        f"{path}: the array {name!r} is longer than its head says; save it again"
+                        f"the array {name!r} is longer than its head says; save it again"
                     )
     return arrays, {}, {}
 
@@ -107,7 +104,7 @@ def _of_hdf5(path: Path) -> Read:
         import h5py
     except ImportError as error:
         mend = "pip install 'algid[hdf5]', or in MATLAB save(FILE, '-v7')"
-        raise LogError(f"{path}: an HDF5 file, for which h5py is needed: {mend}") from error
+        raise LogError(f"an HDF5 file, for which h5py is needed: {mend}") from error
     arrays: Arrays = {}
     attributes: dict[str, dict[str, str]] = {}
     of_groups: dict[str, dict[str, str]] = {}
@@ -122,7 +119,7 @@ def _of_hdf5(path: Path) -> Read:
             for key, value in stated.items():
                 if metadata.setdefault(key, value) != value:
                     raise LogError(
-                        f"{path}: its groups state {key} as {metadata[key]!r:.40} and as "
+                        f"its groups state {key} as {metadata[key]!r:.40} and as "
                         f"{value!r:.40}; state the unit of each dataset by its own attribute"
                     )
             return
@@ -131,7 +128,7 @@ def _of_hdf5(path: Path) -> Read:
         kinds = {kind.kind for kind, *_ in (one.dtype.fields or {"": (one.dtype,)}).values()}
         if name.startswith("#") or not kinds <= set("iufbSO"):
             return
-        _refuse_large(path, one.nbytes)
+        _refuse_large(one.nbytes)
         # HDF5 fills up with zeros what was never written; texts lie apart
         stored, expected, unit = one.id.get_storage_size(), one.nbytes, "bytes"
         if one.chunks is not None:
@@ -140,7 +137,7 @@ def _of_hdf5(path: Path) -> Read:
             expected = int(np.prod(counts)) if one.size else stored
         if stored != expected and "O" not in kinds:
             raise LogError(
-                f"{path}: the array {name!r} has {stored} of {expected} {unit}; the file was cut "
+                f"the array {name!r} has {stored} of {expected} {unit}; the file was cut "
                 "off or damaged, save it again"
             )
         plain, values = name.replace("/", "."), np.asarray(one[()])
@@ -199,9 +196,7 @@ def of_arrays(
                 timed = max(timed, array.size)
     rows = timed or longest
     if rows < 2:
-        raise LogError(
-            f"{path}: no arrays of two samples or more; found {', '.join(arrays) or 'nothing'}"
-        )
+        raise LogError(f"no arrays of two samples or more; found {', '.join(arrays) or 'nothing'}")
     columns: list[pa.Array] = []
     fields: list[pa.Field] = []
     for name, array in found.items():
@@ -253,7 +248,7 @@ def text_of(value: Any) -> str:
 def of_arrow(path: str, kind: str, table: pa.Table, **more: Any) -> TableFile:
     """A table in memory, with `more` of what a `TableFile` has."""
 
-    def batches(names: Sequence[str], _most: int | None) -> Iterator[pa.RecordBatch]:
+    def batches(names: Sequence[str]) -> Iterator[pa.RecordBatch]:
         yield from table.select(list(names)).to_batches(BATCH_ROWS)
 
     return TableFile(path, kind, table.schema, table.num_rows, batches, **more)
@@ -283,7 +278,7 @@ def open_json_lines(path: Path) -> TableFile:
     """
     import polars as pl
 
-    _refuse_large(path, path.stat().st_size)
+    _refuse_large(path.stat().st_size)
     text = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
     notices: tuple[Notice, ...] = ()
     whole = text.rfind(b"\n") + 1
@@ -294,7 +289,7 @@ def open_json_lines(path: Path) -> TableFile:
     deep = re.compile(rb"(?:[\[{][^\[\]{}]*){%d}" % LIMITS.json_depth)
     if deep.search(text) and deep.search(re.sub(rb'"(?:[^"\\]|\\.)*"', b"", text)):
         raise LogError(
-            f"{path}: lists and objects within one another, more than {LIMITS.json_depth} deep; "
+            f"lists and objects within one another, more than {LIMITS.json_depth} deep; "
             "expected a sample of an arm in every line"
         )
     with as_log_error(path, "JSON lines"):
@@ -304,7 +299,7 @@ def open_json_lines(path: Path) -> TableFile:
             reason = str(error).partition("\n")[0][:200]
             wrong = (place for place, line in enumerate(text.split(b"\n")) if not _is_object(line))
             raise LogError(
-                f"{path}: line {next(wrong, 0) + 1}: expected a JSON object in every line "
+                f"line {next(wrong, 0) + 1}: expected a JSON object in every line "
                 f"({reason}); mend or cut it"
             ) from error
         # whole numbers that Arrow has not

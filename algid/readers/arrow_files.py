@@ -39,7 +39,7 @@ def open_parquet(path: Path) -> TableFile:
     if not companion.sums and {"stamp_ns", *CANONICAL_COLUMNS} <= names:
         notices = (Notice("NO_CHECKSUM", numbers={"case": "values"}),)
 
-    def batches(columns: Sequence[str], _most: int | None) -> Iterator[pa.RecordBatch]:
+    def batches(columns: Sequence[str]) -> Iterator[pa.RecordBatch]:
         with (
             as_log_error(path, "Parquet"),
             pq.ParquetFile(path, page_checksum_verification=True, pre_buffer=False) as file,
@@ -59,7 +59,7 @@ def open_feather(path: Path) -> TableFile:
     """
     import pyarrow as pa
 
-    def batches(columns: Sequence[str], _most: int | None) -> Iterator[pa.RecordBatch]:
+    def batches(columns: Sequence[str]) -> Iterator[pa.RecordBatch]:
         with as_log_error(path, "Feather"), pa.memory_map(str(path)) as source:
             places = [names.index(name) for name in columns]
             options = pa.ipc.IpcReadOptions(included_fields=places)

@@ -41,7 +41,6 @@ PAUSE = 20
 
 
 def in_order(
-    path: str,
     tables: Iterator[SampleTable],
     told: list[Notice],
     segment: int | None = None,
@@ -52,8 +51,6 @@ def in_order(
 
     Parameters
     ----------
-    path : str
-        Of the log, for messages.
     tables : iterator of SampleTable
         As they stand in the file.
     told : list of Notice
@@ -79,13 +76,13 @@ def in_order(
         if segment not in (None, run):
             return
         if int(table.stamp_ns[-1]) + shift_ns > LIMITS.largest_time_ns:
-            raise LogError(f"{path}: time starts again, and its runs span over 292 years")
+            raise LogError("time starts again, and its runs span over 292 years")
         yield SampleTable(table.stamp_ns + shift_ns, table.columns) if shift_ns else table
 
     def in_time(table: SampleTable) -> SampleTable:
         """The table in the order of time; what that mends is counted."""
         nonlocal counts
-        ordered, added = _sorted(path, table)
+        ordered, added = _sorted(table)
         counts += added
         return ordered
 
@@ -104,7 +101,7 @@ def in_order(
             ordered = in_time(rows.part(0, start))
             last_ns, first_ns = int(ordered.stamp_ns[-1]), int(rows.stamp_ns[start])
             if not runs:
-                raise LogError(_backwards(path, last_ns, first_ns))
+                raise LogError(_backwards(last_ns, first_ns))
             yield from moved(ordered)
             pause = max(1, round(PAUSE * _period(ordered.stamp_ns[-HORIZON:])))
             shift_ns += last_ns + pause - first_ns
@@ -120,7 +117,7 @@ def in_order(
         held = stack([ordered.part(settled, len(ordered)), rows.part(certain, len(rows))])
     if segment is not None and segment > run:
         last_one, known = Remedy({"segment": run}, "the last one"), counted(run, "run")
-        raise LogError(f"{path}: there is no segment {segment}: its time makes {known}; {last_one}")
+        raise LogError(f"there is no segment {segment}: its time makes {known}; {last_one}")
     if held is not None:
         yield from moved(in_time(held))
     late, repeated, lost = counts.tolist()
@@ -179,7 +176,7 @@ def _restart(table: SampleTable) -> int | None:
     return None
 
 
-def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, tuple[int, int, int]]:
+def _sorted(table: SampleTable) -> tuple[SampleTable, tuple[int, int, int]]:
     """The table in time order, with counts of late samples, dropped repeats, differing repeats.
 
     The last count is of dropped samples whose values differ from those of the sample kept.
@@ -198,14 +195,14 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, tuple[int, int,
     moved = order - np.arange(rows)
     far = int(np.abs(moved).max())
     if far > HORIZON or (far > _FEW and back.size > BACKWARD_SHARE * rows):
-        raise LogError(_backwards(path, int(stamps[back[0]]), int(stamps[back[0] + 1])))
+        raise LogError(_backwards(int(stamps[back[0]]), int(stamps[back[0] + 1])))
     fresh = np.diff(stamps[order], prepend=stamps[order[0]] - 1) > 0
     repeated = rows - int(np.count_nonzero(fresh))
     if repeated > REPEATED_SHARE * rows:
         time = Remedy({"time": None}, "name another time")
         clock = Remedy({"clock": "log"}, "of messages take another clock")
         raise LogError(
-            f"{path}: time stands still: {repeated} of {counted(rows, 'stamp')} as the one before; "
+            f"time stands still: {repeated} of {counted(rows, 'stamp')} as the one before; "
             f"expected increasing stamps; {time}; {clock}"
         )
     kept = order[fresh]
@@ -214,9 +211,9 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, tuple[int, int,
     return table.take(kept), (int(np.count_nonzero(moved > 0)), repeated, int(lost))
 
 
-def _backwards(path: str, last: int, first: int) -> str:
+def _backwards(last: int, first: int) -> str:
     return (
-        f"{path}: time goes backwards by {(last - first) * 1e-9:.6g} s behind stamp {last} ns, "
+        f"time goes backwards by {(last - first) * 1e-9:.6g} s behind stamp {last} ns, "
         "and not for a few late samples only; split the file where its clock starts again"
     )
 
@@ -289,7 +286,6 @@ class Series:
 
 
 def whole_topic(
-    path: str,
     topic: str,
     channels: Collection[str],
     tables: Iterator[SampleTable],
@@ -302,11 +298,11 @@ def whole_topic(
     LogError
         As `in_order`, and if there is no sample.
     """
-    parts = list(in_order(path, tables, told))
+    parts = list(in_order(tables, told))
     if not parts:
         channel = next(iter(channels))
         other = Remedy({f"{channel}.topic": None, f"{channel}.source": None}, "name another")
-        raise LogError(f"{path}: topic {topic!r} holds no sample of {channel}; {other}")
+        raise LogError(f"topic {topic!r} holds no sample of {channel}; {other}")
     return Series(topic, stack(parts))
 
 

@@ -25,7 +25,7 @@ Law = tuple[float, float] | None
 """Of a joint's PD law τ = kp (q_des − θ) − kd θ̇ the gains in N m/rad and N m s/rad."""
 
 
-def laws_of(path: str, profile: Profile) -> tuple[Law, ...]:
+def laws_of(profile: Profile) -> tuple[Law, ...]:
     """The PD law of each joint, where the profile has one.
 
     Raises
@@ -39,7 +39,7 @@ def laws_of(path: str, profile: Profile) -> tuple[Law, ...]:
         needed = {f"{name}.{key}": None for key in ("q_des", "kp") if key not in given}
         if given and needed:
             raise LogError(
-                f"{path}: a PD law of {name} needs a desired angle and a gain, found "
+                f"a PD law of {name} needs a desired angle and a gain, found "
                 f"{', '.join(given)} alone: {Remedy(needed)}"
             )
         laws.append((float(channel.kp or 0), float(channel.kd or 0)) if given else None)
@@ -91,7 +91,7 @@ def convert(
 
 
 def channel_readings(
-    path: str, mapping: Mapping[str, str], profile: Profile, stated: Mapping[str, str]
+    mapping: Mapping[str, str], profile: Profile, stated: Mapping[str, str]
 ) -> dict[str, ChannelReading]:
     """How each channel in `mapping` is to be read.
 
@@ -133,16 +133,16 @@ def channel_readings(
         if unit not in known:
             right = Remedy({f"{like}.unit": known[0]}, "say its unit if that is wrong")
             raise LogError(
-                f"{path}: the column {mapping[name]!r} for {like} is in {unit!r}; expected one of "
+                f"the column {mapping[name]!r} for {like} is in {unit!r}; expected one of "
                 f"{', '.join(known)}; {right}"
             )
-        factor = channel.sign * profile.signs[joint] * _factor(path, like, channel, unit)
+        factor = channel.sign * profile.signs[joint] * _factor(like, channel, unit)
         offset = channel.offset + (0.0 if like[:-1] in ("tau", "omega") else profile.offsets[joint])
         readings[name] = ChannelReading(mapping[name], unit, source, factor, offset)
     return readings
 
 
-def _factor(path: str, name: str, channel: Angle | Velocity | Torque, unit: str) -> float:
+def _factor(name: str, channel: Angle | Velocity | Torque, unit: str) -> float:
     """What a value in `unit` at the channel's own side of the gear is in SI units at the joint."""
     if unit in CURRENT:
         constant = getattr(channel, "torque_constant", None)
@@ -151,7 +151,7 @@ def _factor(path: str, name: str, channel: Angle | Velocity | Torque, unit: str)
             torque = Remedy({f"{name}.unit": "N m"}, "if it is a torque after all")
             unknown = Remedy({f"{name}.torque_constant": 1}, "where the constant is not known")
             raise LogError(
-                f"{path}: {name} is a current; its torque needs the motor's constant in N m/A: "
+                f"{name} is a current; its torque needs the motor's constant in N m/A: "
                 f"{motor}; {torque}; {unknown} gives all constants up to a gain, and a known "
                 f"payload that gain ({flag('payload_mass')})"
             )
@@ -160,7 +160,7 @@ def _factor(path: str, name: str, channel: Angle | Velocity | Torque, unit: str)
         counts = getattr(channel, "counts", None)
         if counts is None:
             turn = Remedy({f"{name}.counts": None})
-            raise LogError(f"{path}: {name} in encoder counts needs counts a turn: {turn}")
+            raise LogError(f"{name} in encoder counts needs counts a turn: {turn}")
         return 2 * math.pi / float(counts) / channel.gear_ratio
     if name.startswith("tau"):
         return TORQUE[unit] * channel.gear_ratio

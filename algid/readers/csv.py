@@ -47,7 +47,7 @@ def open_csv(path: Path, kind: str, names: Sequence[str] | None = None) -> Table
         If the text is no table.
     """
     head = head_of(path, kind)
-    dialect = detect(path, head, names)
+    dialect = detect(head, names)
     beside, companion = sidecar(path), Companion(None, {})
     if beside.is_file():
         with as_log_error(beside, "truth", "remove it"):
@@ -75,7 +75,7 @@ def open_csv(path: Path, kind: str, names: Sequence[str] | None = None) -> Table
         "csv",
         dialect.schema,
         0,
-        partial(_batches, path, source, dialect, quoted),
+        partial(_batches, source, dialect, quoted),
         companion,
         notices,
         expected=expected,
@@ -84,12 +84,10 @@ def open_csv(path: Path, kind: str, names: Sequence[str] | None = None) -> Table
 
 
 def _batches(
-    path: Path,
     source: Path | bytes,
     dialect: Dialect,
     quoted: bool,
     columns: Sequence[str],
-    most: int | None,
 ) -> Iterator[pa.RecordBatch]:
     """The columns' numbers; empty lines are no rows."""
     import polars as pl
@@ -125,7 +123,6 @@ def _batches(
             comment_prefix=dialect.comment,
             skip_lines=dialect.skip,
             quote_char='"' if quoted else None,
-            n_rows=most,
             schema=schema,
             missing_columns="insert",
             glob=False,
@@ -140,7 +137,7 @@ def _batches(
                 # in place: `drop` would queue behind the parsing of the next rows
                 if (found := frame.drop_in_place(name)).any():
                     row = done + (found.arg_max() or 0) + 1
-                    raise LogError(f"{path}: row {row} {wrong}; mend that row")
+                    raise LogError(f"row {row} {wrong}; mend that row")
             done += frame.height
             valued = ~pl.all_horizontal(pl.all().is_null())
             if lost := frame.height - frame.select(valued.sum()).item():
@@ -159,12 +156,12 @@ def _batches(
             yield from table.to_batches()
     except pa.ArrowInvalid as error:
         raise LogError(
-            f"{path}: past row {done - frame.height}: {error}; expected dates of 1678 to 2261"
+            f"past row {done - frame.height}: {error}; expected dates of 1678 to 2261"
         ) from error
     except pl.exceptions.PolarsError as error:
         reason = visible(str(error).partition("\n")[0], 200)
         raise LogError(
-            f"{path}: past row {done}: {reason}; mend that row, quotes too, or name other columns"
+            f"past row {done}: {reason}; mend that row, quotes too, or name other columns"
         ) from error
 
 

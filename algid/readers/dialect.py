@@ -63,14 +63,14 @@ def pieces(path: Path, kind: str) -> Iterator[bytes]:
                 total += len(piece)
                 if total > most:
                     raise LogError(
-                        f"{path}: the compressed data unpack to more than {counted(most, 'byte')}, "
+                        f"the compressed data unpack to more than {counted(most, 'byte')}, "
                         "as no table of their size does; if it is one, unpack it first"
                     )
                 yield piece
                 size = 1 << 24
     except (OSError, ValueError) as error:
         raise LogError(
-            f"{path}: the compressed data are damaged or cut off ({error}); copy it again"
+            f"the compressed data are damaged or cut off ({error}); copy it again"
         ) from error
 
 
@@ -110,7 +110,7 @@ class Dialect:
     said: tuple[str, ...] = ()
 
 
-def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Dialect:
+def detect(head: bytes, names: Sequence[str] | None = None) -> Dialect:
     """The dialect of the table with first bytes `head` and, if given, column names `names`.
 
     Raises
@@ -120,7 +120,7 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
     """
     import pyarrow as pa
 
-    lines = _lines(path, head)
+    lines = _lines(head)
     signs = (sign for sign in COMMENTS if any(line.startswith(sign) for line in lines))
     comment = next(signs, None)
     data = []
@@ -134,10 +134,10 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
             data = data[first:]
             break
     if not data:
-        raise LogError(f"{path}: no table in the text; expected a header and rows of numbers")
+        raise LogError("no table in the text; expected a header and rows of numbers")
     number, header = data[0]
     rows = [line for _, line in data[1:]]
-    separator = _separator(path, header, rows[:19])
+    separator = _separator(header, rows[:19])
     columns, skip = split(header, separator), 1
     above = [line.removeprefix(comment or "").strip() for line in lines[:number]]
     if all(_is_number(cell) for cell in columns if cell):
@@ -151,18 +151,18 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
             columns = list(names)
         else:
             raise LogError(
-                f"{path}: {counted(len(columns), 'column')}, and {counted(len(names), 'name')} for "
+                f"{counted(len(columns), 'column')}, and {counted(len(names), 'name')} for "
                 f"them: {', '.join(names)[:200]}; name each: {flag('columns')}"
             )
     units = _units(columns, split(rows[0], separator)) if rows else {}
     if units:
         skip, rows = skip + 1, rows[1:]
     if not rows:
-        raise LogError(f"{path}: a header and no rows below it; expected rows of numbers")
+        raise LogError("a header and no rows below it; expected rows of numbers")
     found = [split(row, separator) for row in rows]
     if len(found[0]) != len(columns):
         raise LogError(
-            f"{path}: line {data[skip][0] + 1} has {counted(len(found[0]), 'cell')} under a header "
+            f"line {data[skip][0] + 1} has {counted(len(found[0]), 'cell')} under a header "
             f"of {len(columns)}; mend the header"
         )
     fields = []
@@ -240,21 +240,21 @@ def split(line: str, separator: str) -> list[str]:
     return [cell.strip().strip('"').strip() for cell in cells]
 
 
-def _lines(path: Path, head: bytes) -> list[str]:
+def _lines(head: bytes) -> list[str]:
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise LogError(f"{path}: the text is UTF-16; save it as UTF-8")
+        raise LogError("the text is UTF-16; save it as UTF-8")
     text = head.decode("utf-8-sig", errors="replace")
     lines = re.split("\r\n|\n", text)
     for number, line in enumerate(lines, start=1):
         if "\r" in line.rstrip("\r"):
             raise LogError(
-                f"{path}: line {number} holds carriage returns alone, without line feeds; save it "
+                f"line {number} holds carriage returns alone, without line feeds; save it "
                 "with line feeds"
             )
     return lines[:-1] if len(head) >= LIMITS.head_bytes else lines  # the last one may break off
 
 
-def _separator(path: Path, header: str, rows: list[str]) -> str:
+def _separator(header: str, rows: list[str]) -> str:
     for separator in _SEPARATORS:
         wanted = len(split(header, separator))
         if wanted > 1 and all(len(split(row, separator)) == wanted for row in rows[:-1]):
@@ -262,6 +262,4 @@ def _separator(path: Path, header: str, rows: list[str]) -> str:
     for separator in _SEPARATORS:
         if len(split(header, separator)) > 4:
             return separator
-    raise LogError(
-        f"{path}: {header[:60]!r} has one column; expected columns split by , ; | tab or blanks"
-    )
+    raise LogError(f"{header[:60]!r} has one column; expected columns split by , ; | tab or blanks")

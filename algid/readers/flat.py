@@ -36,7 +36,7 @@ from algid.readers.column_names import (
     words,
 )
 from algid.readers.convert import channel_readings, laws_of
-from algid.readers.joints import LOOKED, moving_joints, reading_of
+from algid.readers.joints import moving_joints, reading_of
 from algid.readers.log_reader import TableReader
 from algid.readers.table import (
     JOINT_CHANNELS,
@@ -77,7 +77,7 @@ def offer_table(table: TableFile, profile: Profile) -> Offered:
     gone = [name for name in table.companion.sums if name not in cells]
     if gone:
         raise LogError(
-            f"{path}: the columns {', '.join(gone)} that were written are not there: the file was "
+            f"the columns {', '.join(gone)} that were written are not there: the file was "
             "changed or damaged; write it again, or remove its truth if it was changed on purpose"
         )
     by_user = {name: profile.channel(name).column for name in profile.channels}
@@ -102,16 +102,14 @@ def offer_table(table: TableFile, profile: Profile) -> Offered:
     for name, column in named.items():
         if column not in cells:
             raise LogError(
-                f"{path}: {name} is to be taken from {column!r}, which is not there; "
+                f"{name} is to be taken from {column!r}, which is not there; "
                 f"found {offered.listed()}; name another: {_naming([name])}"
             )
     try:
         choice = choose(cells, profile.joints, named, profile.passive, profile.needed)
     except LookupError as error:
         two = Remedy({"joints": None}, "choose two")
-        raise LogError(
-            f"{path}: {error}; {two}; or name each column: {_naming(['theta1'])} …"
-        ) from error
+        raise LogError(f"{error}; {two}; or name each column: {_naming(['theta1'])} …") from error
     return replace(offered, chosen=choice.columns | named, joints=choice.joints)
 
 
@@ -130,7 +128,7 @@ def open_offered(offered: Offered, profile: Profile) -> TableReader:
         one = fields[source]
         if not (one.is_number or (name == "t" and one.is_clock)):
             held = str(one.type).removeprefix("large_").removesuffix("_view")[:80]
-            raise LogError(f"{path}: column {source!r} for {name} holds {held}; expected numbers")
+            raise LogError(f"column {source!r} for {name} holds {held}; expected numbers")
     notices = list(offered.notices)
     named = all(profile.channel(name).column for name in profile.needed)
     reading = Reading(joints_told="profile" if named else "names")
@@ -156,7 +154,7 @@ def open_offered(offered: Offered, profile: Profile) -> TableReader:
         clock = Clock("s", False)  # algid's own names mean algid's own units
 
     def look(others: Mapping[str, str]) -> Iterator[SampleTable]:
-        return offered.tables({"t": sources["t"], **others}, clock, [], LOOKED)
+        return offered.tables({"t": sources["t"], **others}, clock, [])
 
     angles = [sources[name] for name in ("theta1", "theta2") if name in sources]
     others = dict[str, str]()
@@ -167,7 +165,7 @@ def open_offered(offered: Offered, profile: Profile) -> TableReader:
     angle = ANGLE.get(profile.channel("theta1").unit or units.get("theta1", "rad"))
     notices += moving_joints(others, look, angle) if angle else ()
     topics = dict.fromkeys(fields[source].topic for name, source in sources.items() if name != "t")
-    channels = channel_readings(path, mapping, profile, units)
+    channels = channel_readings(mapping, profile, units)
     reading = replace(
         reading,
         clock=offered.clock,
@@ -182,7 +180,7 @@ def open_offered(offered: Offered, profile: Profile) -> TableReader:
     notices += unused(said, reading, profile)
     notices += settings_unused(profile, reading, mapping)
     origin = Origin(path, offered.kind, mapping, offered.truth, reading)
-    tables, laws = partial(offered.tables, sources, clock), laws_of(path, profile)
+    tables, laws = partial(offered.tables, sources, clock), laws_of(profile)
     return TableReader(origin, tables, tuple(notices), offered.rows, stated_rate(said), laws)
 
 
@@ -207,7 +205,7 @@ def _sources(offered: Offered, profile: Profile) -> dict[str, str]:
     needed = profile.needed if profile.rate is not None else ("t", *profile.needed)
     missing = [name for name in needed if name not in sources]
     if missing:
-        text = f"{offered.path}: no column for {', '.join(missing)}; found {offered.listed()}; "
+        text = f"no column for {', '.join(missing)}; found {offered.listed()}; "
         text += f"name them: {_naming(missing)}"
         if "column 1" in offered.fields:  # there is no header
             named = Remedy({"columns": ["t", "theta1", "theta2", "tau1", "tau2"]})
@@ -271,9 +269,7 @@ def _doubts(
         "tell the gear, turns of the motor in one of the joint, 1 for a direct drive",
     )
     if of_joints:
-        raise LogError(
-            f"{offered.path}: {named}: signals of motors beside those of joints; {gears}"
-        )
+        raise LogError(f"{named}: signals of motors beside those of joints; {gears}")
     yield Notice("OTHER_UNIT", numbers={"case": "motor", "columns": named}, remedies=(gears,))
 
 
@@ -283,7 +279,6 @@ def samples(
     sources: Mapping[str, str],
     clock: Clock,
     told: list[Notice],
-    most: int | None = None,
 ) -> Iterator[SampleTable]:
     """The rows that have every value, with their stamps.
 
@@ -297,20 +292,18 @@ def samples(
     clock : Clock
     told : list of Notice
         At the end it has what is to be said of the other rows, too.
-    most : int, optional
-        Rows that are needed.
 
     Raises
     ------
     LogError
         If no row has every value, a time is no time, or the values are not those written.
     """
-    path, unit, column, sums = table.path, clock.unit, sources["t"], table.companion.sums
+    unit, column, sums = clock.unit, sources["t"], table.companion.sums
     sources, time = {"t": column, **sources}, cells[column].type
     left = {name: sums[source] for name, source in sources.items() if source in sums}
     count = lost = done = 0
     cut_off = False
-    for arrays in cell_batches(table, cells, list(sources.values()), most):
+    for arrays in cell_batches(table, cells, list(sources.values())):
         import pyarrow as pa
 
         whole = batch = pa.RecordBatch.from_arrays(arrays, names=list(sources))
@@ -338,7 +331,7 @@ def samples(
                 stamps = np.rint((done + np.arange(times.size)) * (1e9 / clock.rate))
                 stamps = stamps.astype(np.int64)
         except ValueError as error:
-            raise LogError(f"{path}: {error} in column {column!r}, past row {done}") from error
+            raise LogError(f"{error} in column {column!r}, past row {done}") from error
         doubtful = unit and not (done or clock.stated)
         if doubtful and (step := _median_step(stamps - stamps[:1])) > 1e9 * SLOWEST:
             likely = _unit_of_step(step / NANOSECONDS[unit or "s"])
@@ -349,14 +342,13 @@ def samples(
         yield SampleTable(stamps, channels)
     if lost and lost == count and not (lost == 1 and cut_off):
         raise LogError(
-            f"{path}: no row has a value in every column that is needed; put the signals on "
-            "common stamps"
+            "no row has a value in every column that is needed; put the signals on common stamps"
         )
     if lost == 1 and cut_off:
         told.append(Notice("CUT_OFF", numbers={"case": "row", "row": count}))
     elif lost and clock.rate is not None:
         raise LogError(
-            f"{path}: rows lack a value, and without a time the rows behind them have none; "
+            "rows lack a value, and without a time the rows behind them have none; "
             "fill the cells, or add a column of times"
         )
     elif lost:
@@ -365,7 +357,7 @@ def samples(
     wrong = [name for name, rest in left.items() if rest]
     if wrong:
         raise LogError(
-            f"{path}: the values of {', '.join(wrong)} are not those that were written: the file "
+            f"the values of {', '.join(wrong)} are not those that were written: the file "
             "was changed or damaged; write it again, or remove its truth if it was changed on "
             "purpose"
         )

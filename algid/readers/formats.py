@@ -129,9 +129,7 @@ def format_of(path: Path) -> FileFormat:
             return _BY_NAME["rosbag2"]
         if not path.is_file():
             problem = "it is no regular file" if path.exists() else "there is no such file"
-            raise LogError(
-                f"{path}: {problem}; expected a log in MCAP, Parquet or CSV; check the name"
-            )
+            raise LogError(f"{problem}; expected a log in MCAP, Parquet or CSV; check the name")
         head = read_start(path, LIMITS.head_bytes)
     except (OSError, ValueError) as error:
         raise LogError(
@@ -144,8 +142,7 @@ def format_of(path: Path) -> FileFormat:
             inside = head_of(path, form.name)
             if not (inside and looks_like_text(inside)):
                 raise LogError(
-                    f"{path}: compressed, but not a table of text; unpack it and name what is "
-                    "inside"
+                    "compressed, but not a table of text; unpack it and name what is inside"
                 )
         if form.name != "npz" or path.suffix.lower() == ".npz":  # any zip begins so
             return form
@@ -155,14 +152,13 @@ def format_of(path: Path) -> FileFormat:
 
         return _BY_NAME["jsonl" if is_json_lines(head) else "csv"]
     if not head:
-        raise LogError(f"{path}: the file is empty; expected a log in MCAP, Parquet or CSV")
+        raise LogError("the file is empty; expected a log in MCAP, Parquet or CSV")
     if head.startswith(b"\x93NUMPY"):
         raise LogError(
-            f"{path}: a single NumPy array; save its columns with np.savez(FILE, t=…, q=…, tau=…)"
+            "a single NumPy array; save its columns with np.savez(FILE, t=…, q=…, tau=…)"
         )
     raise LogError(
-        f"{path}: unknown format, it begins with {head[:8]!r}; expected a log in MCAP, Parquet or "
-        "CSV"
+        f"unknown format, it begins with {head[:8]!r}; expected a log in MCAP, Parquet or CSV"
     )
 
 

@@ -93,7 +93,7 @@ class TableReader:
             return Log(stamps, one["theta"], one["tau"], origin, omega, tuple(told), reference)
 
         segment = origin.reading.segment
-        ordered = in_order(origin.path, self.tables(told), told, segment, runs=True)
+        ordered = in_order(self.tables(told), told, segment, runs=True)
         for table in cut(self._usable(ordered, told), min(ROWS, most)):
             first = used
             if used and used + len(table) > most:
@@ -125,9 +125,7 @@ class TableReader:
         if total < 2:
             worst = min(told, key=lambda notice: not notice.lossy, default=None)
             why = "" if worst is None else f" ({worst.text})"
-            raise LogError(
-                f"{origin.path}: {counted(total, 'sample')}; a log needs two at least{why}"
-            )
+            raise LogError(f"{counted(total, 'sample')}; a log needs two at least{why}")
         yield log()
 
     def _usable(self, tables: Iterator[SampleTable], told: list[Notice]) -> Iterator[SampleTable]:
@@ -165,7 +163,7 @@ class TableReader:
                     out = Remedy({"start": None, "end": None}, "cut that part out")
                     accept = Remedy({"accept": "NOT_FINITE"}, "or leave such samples out")
                     raise LogError(
-                        f"{self.origin.path}: {name} ({mapping.get(name, name)}) in sample "
+                        f"{name} ({mapping.get(name, name)}) in sample "
                         f"{done + row + 1}: expected a finite number below "
                         f"{LIMITS.largest_value:g} in size, found {values[row]}; {out}; {accept}"
                     )

@@ -167,7 +167,7 @@ class Offered:
     kind: str
     fields: Mapping[str, Cell | TopicField]
     chosen: Mapping[str, str]
-    tables: Callable[[Mapping[str, str], Clock, list[Notice], int | None], Iterator[SampleTable]]
+    tables: Callable[[Mapping[str, str], Clock, list[Notice]], Iterator[SampleTable]]
     truth: Truth | None
     clock: str = "column"
     joints: tuple[str, str] | None = None

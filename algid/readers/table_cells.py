@@ -51,8 +51,8 @@ class TableFile:
     rows : int
         0 where the file does not tell.
     batches : callable
-        A fresh pass over some columns in record batches, of which nobody takes more rows than a
-        number if one is given. Whatever way of missing a value the format has is a null.
+        A fresh pass over some columns in record batches, in which whatever way of missing a value
+        the format has is a null.
     companion : Companion
         Truth and sums that algid wrote with the columns.
     notices : tuple of Notice
@@ -69,7 +69,7 @@ class TableFile:
     kind: str
     schema: pa.Schema
     rows: int
-    batches: Callable[[Sequence[str], int | None], Iterator[pa.RecordBatch]]
+    batches: Callable[[Sequence[str]], Iterator[pa.RecordBatch]]
     companion: Companion = field(default_factory=lambda: Companion(None, {}))
     notices: tuple[Notice, ...] = ()
     others: tuple[str, ...] = ()
@@ -122,7 +122,7 @@ class Cell:
 
 
 def cell_batches(
-    table: TableFile, cells: Mapping[str, Cell], names: Sequence[str], most: int | None
+    table: TableFile, cells: Mapping[str, Cell], names: Sequence[str]
 ) -> Iterator[list[pa.Array]]:
     """Some cells of each batch of rows: integers, floats, or for a clock ticks of its type.
 
@@ -147,7 +147,7 @@ def cell_batches(
         for place, one in enumerate(chosen):
             value = pl.when(~pl.any_horizontal(bad)).then(one.taken) if bad else one.taken
             made.append(value.alias(str(place)))
-    for batch in table.batches(list(dict.fromkeys(columns)), most):
+    for batch in table.batches(list(dict.fromkeys(columns))):
         arrays = [batch.column(one.columns[0]) for one in chosen]
         if made:
             arrays = [series.to_arrow() for series in pl.DataFrame(batch).select(made)]
@@ -171,16 +171,14 @@ def cells_of(table: TableFile) -> dict[str, Cell]:
 
     twice = repeated(filter(None, table.schema.names))
     if twice:
-        raise LogError(
-            f"{table.path}: the column {twice[0][:80]!r} stands in the file twice; rename one"
-        )
+        raise LogError(f"the column {twice[0][:80]!r} stands in the file twice; rename one")
     nested = [one.name for one in table.schema if is_list(one.type) or pa.types.is_struct(one.type)]
     frame: Any = None
     if nested:
         import polars as pl
 
         with as_log_error(table.path, table.kind):
-            frame = pl.DataFrame(next(table.batches(nested, BATCH_ROWS), None))
+            frame = pl.DataFrame(next(table.batches(nested), None))
     metadata = decoded(table.schema.metadata)
     label, joints = _spoken(table)
     cells: dict[str, Cell] = {}
@@ -197,7 +195,7 @@ def cells_of(table: TableFile) -> dict[str, Cell]:
                 at = pl.when(own.any()).then(own.arg_max())
                 number = _lists(_whole(one.name), one.type).get(at, null_on_oob=True)
                 cell = Cell((one.name, label), one.type.value_type, number, joint)
-                cells[f"/{label}/{joint}/{one.name}"] = _marked(table.path, cell, said)
+                cells[f"/{label}/{joint}/{one.name}"] = _marked(cell, said)
             continue
         named = [text[key] for text in (own, metadata) for key in LABELS if key in text]
         names = next(filter(None, map(_names, named)), [])
@@ -208,11 +206,9 @@ def cells_of(table: TableFile) -> dict[str, Cell]:
             place = _PLACE.fullmatch(name)
             if place and _is_quantity(place[1]) and int(place[2]) < len(names):
                 name = f"/joint_names/{names[int(place[2])]}/{place[1]}"
-            cells[name] = _marked(table.path, Cell((one.name,), kind, part), said)
+            cells[name] = _marked(Cell((one.name,), kind, part), said)
             if len(cells) > LIMITS.columns:
-                raise LogError(
-                    f"{table.path}: more than {LIMITS.columns} columns; expected a log of an arm"
-                )
+                raise LogError(f"more than {LIMITS.columns} columns; expected a log of an arm")
     return cells
 
 
@@ -265,7 +261,7 @@ def _spoken(table: TableFile) -> tuple[str, list[str]]:
     """
     for one in table.schema:
         if one.name.lower() in LABELS and is_list(one.type) and is_text(one.type.value_type):
-            for batch in table.batches([one.name], None):
+            for batch in table.batches([one.name]):
                 for row in batch.column(0):
                     if len(row.as_py() or ()) > 1:
                         return one.name, row.as_py()
@@ -284,7 +280,7 @@ def _names(text: str) -> list[str]:
     return names if len(set(names)) == len(names) > 1 else []
 
 
-def _marked(path: str, cell: Cell, said: Mapping[str, str]) -> Cell:
+def _marked(cell: Cell, said: Mapping[str, str]) -> Cell:
     """The cell with unit, scale, offset and marks of missing values that a file states of it."""
     import pyarrow as pa
 
@@ -297,7 +293,7 @@ def _marked(path: str, cell: Cell, said: Mapping[str, str]) -> Cell:
                 numbers[key] = float(said[key])
             except ValueError as error:
                 raise LogError(
-                    f"{path}: {key} of the column {cell.columns[0]!r} is {said[key][:40]!r}; "
+                    f"{key} of the column {cell.columns[0]!r} is {said[key][:40]!r}; "
                     "expected a number"
                 ) from error
     if not numbers:
@@ -394,5 +390,5 @@ def _is_plain(kind: pa.DataType) -> bool:
 
 def _values(table: TableFile, name: str) -> Iterator[Any]:
     """The values of a column, each once a batch."""
-    for batch in table.batches([name], None):
+    for batch in table.batches([name]):
         yield from batch.column(0).drop_null().unique().to_pylist()

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from algid.base.errors import LogError
+from algid.base.faults import during
 from algid.notices import Notice, Remedy
 from algid.readers.clock import aligned, in_order, whole_topic
 from algid.readers.formats import entries_at
@@ -54,27 +55,29 @@ def open_with_torque_file(
             f"folder; {Remedy({'torque_file': None}, 'name it')}"
         )
     angles = open_one(log, profile.half("theta", "omega", "q_des"))
-    path, wanted = angles.origin.path, angles.origin.reading.joints
-    stated = profile.time or profile.topic  # else nobody asks what the file has
-    names = {entry.name for entry in entries_at(other)} if stated else set[str]()
-    of_angles = {"columns": None}
-    for key in ("time", "topic"):
-        if getattr(profile, key) not in names:
-            of_angles[key] = None
-    half = profile.half("tau").model_copy(update=of_angles)
-    torques = open_one(other, half)
-    there = torques.origin.reading.joints
-    if wanted and there and wanted != there and set(wanted) == set(there):
-        torques = open_one(other, half.model_copy(update={"joints": wanted}))
+    wanted = angles.origin.reading.joints
+    with during("opening", other):
+        stated = profile.time or profile.topic  # else nobody asks what the file has
+        names = {entry.name for entry in entries_at(other)} if stated else set[str]()
+        of_angles = {"columns": None}
+        for key in ("time", "topic"):
+            if getattr(profile, key) not in names:
+                of_angles[key] = None
+        half = profile.half("tau").model_copy(update=of_angles)
+        torques = open_one(other, half)
+        there = torques.origin.reading.joints
+        if wanted and there and wanted != there and set(wanted) == set(there):
+            torques = open_one(other, half.model_copy(update={"joints": wanted}))
 
     def tables(told: list[Notice]) -> Iterator[SampleTable]:
         mapping = torques.origin.mapping
-        series = whole_topic(str(other), other.name, mapping, torques.tables(told), told)
+        with during("reading", other):
+            series = whole_topic(other.name, mapping, torques.tables(told), told)
         first, last = series.table.stamp_ns[[0, -1]]
 
         def within() -> Iterator[SampleTable]:
             outside = 0
-            for table in in_order(path, angles.tables(told), told):
+            for table in in_order(angles.tables(told), told):
                 kept = table.only((table.stamp_ns >= first) & (table.stamp_ns <= last))
                 outside += len(table) - len(kept)
                 yield kept

@@ -39,7 +39,7 @@ def ordered(
 ) -> tuple[SampleTable, list[Notice]]:
     """What comes out, as one table, and what is said: stamps rise within and across the tables."""
     told = list[Notice]()
-    found = stack(list(in_order("log", iter(tables), told, only, runs=runs)))
+    found = stack(list(in_order(iter(tables), told, only, runs=runs)))
     assert np.all(np.diff(found.stamp_ns) > 0)
     return found, told
 
@@ -137,7 +137,7 @@ def test_memory_is_bounded_where_tables_overlap() -> None:
     parts = np.split(stamps, range(4000, 40_000, 4000))
     for one, other in pairwise(parts):
         one[-1], other[0] = other[0], one[-1]
-    sizes = [len(found) for found in in_order("log", (table(part) for part in parts), [])]
+    sizes = [len(found) for found in in_order((table(part) for part in parts), [])]
     assert sum(sizes) == stamps.size
     assert max(sizes) <= 8000
 
@@ -204,7 +204,6 @@ def test_alignment_does_not_depend_on_the_clock_or_the_tables(shift: int, cut: i
 
 def test_a_topic_is_read_whole_in_order_or_refused() -> None:
     found = whole_topic(
-        "log",
         "/other",
         ["tau1"],
         iter([table(range(0, 20, 2)), table([]), table([17, 21, 22, 23])]),
@@ -215,7 +214,7 @@ def test_a_topic_is_read_whole_in_order_or_refused() -> None:
         LogError,
         match=r"topic '/other' holds no sample of tau1; .*--set tau1.topic=NAME",
     ):
-        whole_topic("log", "/other", ["tau1", "tau2"], iter([table([])]), [])
+        whole_topic("/other", ["tau1", "tau2"], iter([table([])]), [])
 
 
 @settings(max_examples=60, deadline=None)

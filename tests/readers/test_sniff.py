@@ -87,7 +87,7 @@ def test_text_may_be_cut_within_a_letter_and_nowhere_else() -> None:
 
 
 def found(text: str) -> Dialect:
-    return detect(Path("log.csv"), text.encode())
+    return detect(text.encode())
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_tables_that_are_none(text: str, words: str) -> None:
 def test_text_of_other_encodings_is_refused() -> None:
     for code in ("utf-16-le", "utf-16-be"):
         with pytest.raises(LogError, match="UTF-16; save it as UTF-8"):
-            detect(Path("log.csv"), "\ufefft,q1\n".encode(code))
+            detect("\ufefft,q1\n".encode(code))
 
 
 def test_a_cell_of_more_than_nineteen_digits_is_no_int64() -> None:

@@ -20,7 +20,6 @@ from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import codec_for, topic_tables
 from algid.readers.table import (
     REFERENCES,
-    ROWS,
     Clock,
     Offered,
     SampleTable,
@@ -123,11 +122,9 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
     fields[chosen["t"]] = time
 
     def tables(
-        sources: Mapping[str, str], _clock: Clock, told: list[Notice], most: int | None = None
+        sources: Mapping[str, str], _clock: Clock, told: list[Notice]
     ) -> Iterator[SampleTable]:
-        """The samples of the first topic, each with what the others have at its time.
-
-        Tables have at least `most` rows, but for the last. All stamps are in ns.
+        """The samples of the first topic, each with what the others have at its time, in ns.
 
         Raises
         ------
@@ -141,7 +138,7 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
 
         def read(name: str, told: list[Notice]) -> Iterator[SampleTable]:
             own = log.files, name, homes[name], stamps[name], profile.clock == "header" or None
-            return topic_tables(*own, told, most or ROWS)
+            return topic_tables(*own, told)
 
         main, *others = homes
         samples = read(main, told)
@@ -152,7 +149,7 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
             only_followed = set(homes[one]) <= set(REFERENCES)
             own = list[Notice]() if only_followed else told  # it may be missing
             try:
-                series = whole_topic(log.path, one, homes[one], read(one, own), own)
+                series = whole_topic(one, homes[one], read(one, own), own)
                 (followed if only_followed else needed).append(series)
             except LogError as error:
                 if not only_followed:
@@ -160,7 +157,7 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
                 why = str(error).removeprefix(f"{log.path}: ")
                 numbers = {"case": "reference", "topic": one, "why": why}
                 told.append(Notice("MESSAGES_LEFT_OUT", numbers=numbers))
-        return aligned(in_order(log.path, samples, told), needed, told, followed)
+        return aligned(in_order(samples, told), needed, told, followed)
 
     clock = "header" if stamp else "log"
     return Offered(

@@ -17,7 +17,7 @@ from algid.readers.messages import protobuf, ros
 from algid.readers.messages.json import JsonRecords
 from algid.readers.messages.layout import Codec, Decoder, MisfitError
 from algid.readers.messages.message_file import MessageChannel, MessageFile
-from algid.readers.table import SampleTable, stack
+from algid.readers.table import ROWS, SampleTable, stack
 
 _STAMP = ("sec", "nanosec")
 
@@ -63,9 +63,8 @@ def topic_tables(
     stamp: tuple[str, str] | None,
     by_header: bool | None,
     told: list[Notice],
-    rows: int,
 ) -> Iterator[SampleTable]:
-    """A topic's samples in tables of about `rows` rows; what is lost is told at a file's end.
+    """A topic's samples in tables of about `ROWS` rows; what is lost is told at a file's end.
 
     Parameters
     ----------
@@ -79,7 +78,6 @@ def topic_tables(
     by_header : bool or None
         Whether to take that stamp; None: unless it stands still.
     told : list of Notice
-    rows : int
 
     Raises
     ------
@@ -141,7 +139,7 @@ def topic_tables(
                     raise LogError(f"{place}: {why}")
                 parts.append(SampleTable(messages.log_ns[held], columns))  # type: ignore[arg-type]
                 size += len(parts[-1])
-            if size >= rows:
+            if size >= ROWS:
                 yield clocked(parts)
                 parts, size = [], 0
         if parts:
