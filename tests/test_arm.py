@@ -12,7 +12,6 @@ from algid.arm import (
     Arm,
     forward_dynamics,
     inverse_dynamics,
-    mass_matrix,
     read_only,
     with_payload,
 )
@@ -87,13 +86,6 @@ def test_constants_of_case_1_follow_table_1() -> None:
         0.3072,
     ]
     np.testing.assert_allclose(k, by_hand, rtol=1e-14)
-
-
-def test_mass_matrix_of_a_real_arm_is_positive_definite() -> None:
-    k = load_case("case1").arm.constants()
-    m11, m12, m22 = mass_matrix(k, np.stack([np.zeros(361), np.linspace(-np.pi, np.pi, 361)]))
-    assert np.all(m11 > 0)
-    assert np.all(m11 * m22 > m12**2)
 
 
 def test_what_is_handed_out_read_only_cannot_be_written_to() -> None:

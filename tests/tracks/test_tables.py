@@ -94,13 +94,8 @@ def test_a_long_track_keeps_its_extremes_and_breaks_at_holes() -> None:
     assert y.size < made.track.t.size
     assert (np.nanmin(y), np.nanmax(y)) == pytest.approx((-0.4, 0.9))
     (steps,) = named(data, "mass of each stretch")
-    stretches = made.track.stretches
-    assert typed(steps["x"]).tolist() == pytest.approx(
-        [at for one in stretches for at in (one.start, one.end)]
-    )
-    assert typed(steps["y"]).tolist() == pytest.approx(
-        [one.m_p for one in stretches for _ in range(2)]
-    )
+    assert typed(steps["x"])[:4].tolist() == [0, 1, 1, 2]
+    assert typed(steps["y"])[:4].tolist() == pytest.approx([0.1, 0.1, 0.35, 0.35])
     ends = np.concatenate([typed(one["y"]) for one in named(data, "its 95 % band")])
     assert ends.max() == pytest.approx(0.9 + 1.96 * 0.001, rel=1e-4)
     assert ends.min() == pytest.approx(-0.4 - 1.96 * 0.001, rel=1e-4)
