@@ -12,6 +12,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, ChunkIndex, McapRecord, Schema, Statistics
@@ -33,6 +34,7 @@ from tests.readers.mcaps import (
 LOG = noise_log(120, start_ns=EPOCH_NS)
 LONG = noise_log(2000, start_ns=EPOCH_NS)
 PLAIN = CompressionType.NONE
+PACKED = list(CompressionType)
 Records = list[McapRecord]
 Edit = Callable[[Records], Records]
 
@@ -173,15 +175,6 @@ def test_a_damaged_footer_is_told_and_the_file_is_walked(
     assert [(one.code, one.case) for one in found.notices] == [("DAMAGED_INDEX", "summary")]
 
 
-def test_two_files_behind_one_another_are_not_one(tmp_path: Path) -> None:
-    path = tmp_path / "log.mcap"
-    whole = made(path, LOG)
-    path.write_bytes(whole + whole)
-    found = read_log(path)
-    assert same(found, LOG)
-    assert f"at byte {len(whole) - 8}: {len(whole) + 8:,} bytes" in lost(found)["CUT_OFF"]
-
-
 @pytest.mark.parametrize("tail", [b"", b"\x89MCAP0\r\n"])
 @pytest.mark.parametrize("before", ["message", "chunk", "index"])
 def test_an_end_of_the_data_that_stands_too_early_hides_no_loss(
@@ -206,27 +199,6 @@ def test_an_end_of_the_data_that_stands_too_early_hides_no_loss(
     assert lost(found)
 
 
-def test_what_the_statistics_promise_and_a_walk_does_not_find_is_told(tmp_path: Path) -> None:
-    path = tmp_path / "log.mcap"
-    whole = made(path, LOG)
-    chunk = chunks_of(path)[1]
-    start = chunk.chunk_start_offset
-    end = start + chunk.chunk_length + chunk.message_index_length
-    unlisted = summarised(whole, without(ChunkIndex), checksum=False)
-    unlisted = poked(unlisted, len(unlisted) - 28, "<Q", summary_of(whole) - (end - start))
-    path.write_bytes(unlisted[:start] + unlisted[end:])
-    found = read_log(path)
-    assert 0 < len(found) < len(LOG)
-    assert lost(found) == {"DAMAGED": f"the file counts {len(LOG)} messages and holds {len(found)}"}
-
-
-def test_a_file_cut_between_two_records_is_called_cut(tmp_path: Path) -> None:
-    path = tmp_path / "log.mcap"
-    content = made(path)
-    found = beginning(path, content[: chunks_of(path)[5].chunk_start_offset])
-    assert lost(found) == {"CUT_OFF": "the file breaks off behind its last whole record"}
-
-
 VERY_LONG = noise_log(20_000, start_ns=EPOCH_NS)
 """About 3 MB of messages, many blocks of zstd and lz4."""
 
@@ -247,69 +219,6 @@ def test_a_chunk_that_breaks_off_yields_its_whole_messages(
     assert 0.53 < len(found) / len(VERY_LONG) < 0.61
     assert lost(found).keys() == {"CUT_OFF"}
     assert "an unfinished chunk" in lost(found)["CUT_OFF"]
-
-
-@pytest.mark.parametrize("chunked", [True, False])
-@pytest.mark.parametrize("length", [0, 3, 1 << 20, (1 << 64) - 1])
-def test_a_file_is_read_up_to_its_first_broken_record(
-    length: int, chunked: bool, tmp_path: Path
-) -> None:
-    path = tmp_path / "log.mcap"
-    options: dict[str, Any] = {"compression": PLAIN} if chunked else NO_INDEX
-    content = made(path, use_chunking=chunked, **options)
-    if chunked:
-        place = chunks_of(path)[len(chunks_of(path)) // 2].chunk_start_offset
-        content = content[:-8] + b"no magic"
-    else:
-        size = len(messages_of(LONG)[1000][2])
-        before = content.index(struct.pack("<d", LONG.theta[0, 1000]))
-        place = content.rindex(struct.pack("<BQ", 5, 22 + size), 0, before)
-    found = beginning(path, poked(content, place + 1, "<Q", length))
-    # a chunk that claims more bytes than the file has is torn, and whole
-    assert 960 < len(found) < 1040
-    told = lost(found)["CUT_OFF"].replace(",", "")
-    assert f" {place}:" in told or f" {len(content) - place} " in told or length in (0, 3)
-
-
-@pytest.mark.parametrize("statistics", [True, False])
-def test_a_flipped_bit_costs_its_chunk_and_is_told(statistics: bool, tmp_path: Path) -> None:
-    """Without statistics, the chunk's own index tells how many are lost."""
-    path, value = tmp_path / "log.mcap", LONG.theta[0, 1000]
-    content = made(path, compression=PLAIN, use_statistics=statistics)
-    path.write_bytes(flipped(content, value))
-    found = read_log(path)
-    assert len(found) > 1900
-    assert value not in found.theta
-    assert lost(found).keys() == {"DAMAGED"}
-    missing = f"{len(LONG) - len(found):,} messages are missing"
-    assert missing in lost(found)["DAMAGED"]
-
-
-@pytest.mark.parametrize("statistics", [True, False])
-def test_what_a_file_promises_is_counted_behind_a_chunk_that_is_called_another_record(
-    statistics: bool, tmp_path: Path
-) -> None:
-    path = tmp_path / "log.mcap"
-    content = made(path, use_statistics=statistics)
-    found = beginning(path, poked(content, chunks_of(path)[3].chunk_start_offset, "<B", 0x86))
-    told = {"DAMAGED", "CUT_OFF"} if statistics else {"CUT_OFF"}
-    assert 0 < len(found) < 200
-    assert lost(found).keys() == told
-
-
-@pytest.mark.parametrize(("place", "value"), [(23, 31), (23, 1 << 40), (23, -8), (9, 7)])
-def test_a_message_index_that_lies_is_not_believed(place: int, value: int, tmp_path: Path) -> None:
-    path = tmp_path / "log.mcap"
-    content = made(path, compression=PLAIN, chunk_size=1 << 15)
-    (index,) = chunks_of(path)[0].message_index_offsets.values()
-    # the offset of the first message, or the channel
-    path.write_bytes(poked(content, index + place, "<h" if place == 9 else "<q", value))
-    found = read_log(path)
-    if place == 9:  # the chunk is taken for one of another channel's
-        assert lost(found).keys() == {"DAMAGED"}
-    else:
-        assert same(found, LONG)
-        assert not found.notices
 
 
 def test_a_file_of_which_damage_left_nothing_says_so_and_where(tmp_path: Path) -> None:
@@ -346,15 +255,68 @@ def test_the_truth_in_the_metadata_is_read_where_it_can_be(tmp_path: Path) -> No
             read_log(path)
 
 
-@pytest.mark.parametrize("packed", CompressionType)
-@pytest.mark.parametrize("claimed", [0, 100])
-def test_a_chunk_that_holds_more_than_it_claims_is_lost_and_told(
-    packed: CompressionType, claimed: int, tmp_path: Path
-) -> None:
+def test_what_lies_behind_the_last_whole_record_is_called_cut(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
-    content = made(path, LOG, compression=packed)
-    size_at = chunks_of(path)[0].chunk_start_offset + 9 + 16
-    path.write_bytes(poked(content, size_at, "<QI", claimed, 0))  # and no checksum
+    whole = made(path)
+    cut = whole[: chunks_of(path)[5].chunk_start_offset]
+    two = f"at byte {len(whole) - 8}: {len(whole) + 8:,} bytes"
+    for content, words in ((cut, "breaks off behind its last whole record"), (whole * 2, two)):
+        assert words in lost(beginning(path, content))["CUT_OFF"]
+
+
+def test_a_chunk_of_which_the_statistics_alone_know_is_missed(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    whole = made(path, LOG)
+    chunk = chunks_of(path)[1]
+    start = chunk.chunk_start_offset
+    gone = chunk.chunk_length + chunk.message_index_length
+    unlisted = summarised(whole, without(ChunkIndex), checksum=False)
+    unlisted = poked(unlisted, -28, "<Q", summary_of(whole) - gone)
+    path.write_bytes(unlisted[:start] + unlisted[start + gone :])
     found = read_log(path)
     assert 0 < len(found) < len(LOG)
-    assert "a chunk's size or its checksum is wrong" in lost(found)["DAMAGED"]
+    assert lost(found) == {"DAMAGED": f"the file counts {len(LOG)} messages and holds {len(found)}"}
+
+
+BARE = {"compression": PLAIN}
+UNKNOWN = BARE | {"use_statistics": False}
+"""Without statistics, a chunk's own index tells how many messages are lost."""
+LOOSE = NO_INDEX | {"use_chunking": False}
+LENGTHS = (0, 3, 1 << 20, (1 << 64) - 1)
+DAMAGES: list[tuple[dict[str, Any], str, int, str, tuple[int, ...], str]] = [
+    ({}, "chunk", 0, "<B", (0x86,), "DAMAGED CUT_OFF"),  # is called another record
+    (UNKNOWN, "chunk", 0, "<B", (0x86,), "CUT_OFF"),
+    (BARE, "number", 0, "<B", (7,), "DAMAGED"),
+    (UNKNOWN, "number", 0, "<B", (7,), "DAMAGED"),
+    (BARE, "index", 9, "<h", (7,), "DAMAGED"),  # is taken for one of another channel's
+    *((BARE, "index", 23, "<q", (to,), "") for to in (31, 1 << 40, -8)),
+    *((BARE | {"compression": one}, "chunk", 25, "<QI", (0, 0), "DAMAGED") for one in PACKED),
+    *((BARE | {"compression": one}, "chunk", 25, "<QI", (100, 0), "DAMAGED") for one in PACKED),
+    *((BARE, "chunk", 1, "<Q", (length,), "DAMAGED CUT_OFF") for length in LENGTHS),
+    *((LOOSE, "message", 1, "<Q", (length,), "CUT_OFF") for length in LENGTHS),
+]
+"""How a file is written, what of it is changed from which byte on, to what, and what is lost."""
+
+
+@pytest.mark.parametrize("row", DAMAGES, ids=str)
+def test_what_damage_leaves_is_right_and_what_it_takes_is_told(row: Any, tmp_path: Path) -> None:
+    path, (options, part, offset, form, values, codes) = tmp_path / "log.mcap", row
+    whole = made(path, **options)
+    place = whole.index(struct.pack("<d", LONG.theta[0, 1000]))
+    if part == "message":
+        size = 22 + len(messages_of(LONG)[1000][2])
+        place = whole.rindex(struct.pack("<BQ", 5, size), 0, place)
+    elif part != "number":
+        chunk = chunks_of(path)[3]
+        (index,) = chunk.message_index_offsets.values()
+        place = index if part == "index" else chunk.chunk_start_offset
+    path.write_bytes(poked(whole, place + offset, form, *values))
+    found = read_log(path)
+    kept = np.isin(LONG.stamp_ns, found.stamp_ns)
+    assert np.array_equal(found.theta, LONG.theta[:, kept])
+    told, missing = lost(found), len(LONG) - len(found)
+    assert told.keys() == {*codes.split()}
+    assert (0 < missing < len(LONG)) == bool(codes)
+    if codes == "DAMAGED":
+        counts = f"{missing} messages are missing", f"counts 2,000 messages and holds {len(found)}"
+        assert any(words in told["DAMAGED"] for words in counts)
