@@ -8,14 +8,13 @@ from pathlib import Path
 
 import polars as pl
 import pytest
-from click.testing import CliRunner
 from scipy.stats import norm
 
 from algid.api.report import report
 from algid.batches.jobs import Job, JobRecord, JobStatus, jobs_frame
 from algid.fleet.history import history_of
 from algid.fleet.page import overview
-from tests.cli.commands import app
+from tests.cli.commands import call
 from tests.report.pages import Page, named, typed
 
 START = 1_700_000_000 * 10**9
@@ -39,25 +38,21 @@ def written(folder: Path, known: Mapping[str, Known]) -> Path:
 def batch(folder: Path) -> Path:
     """A batch whose first robot's k6 doubles within its ten logs, one a day."""
     known: dict[str, Known] = {}
-    for robot in range(2):
-        for day in range(10):
-            estimates = {
-                "k1": (1.0, 0.01, "OK"),
-                "k6": (1.0 + (day / 10 if robot == 0 else 0.0), 0.01, "OK"),
-                "m_p": (0.5 if robot or day else 0.9, 0.001, "OK"),
-            }
-            known[f"r{robot}/{day}"] = f"r{robot}", START + day * DAY, estimates
+    for day in range(10):
+        for robot, k6, m_p in (("r0", 1 + day / 10, 0.5 if day else 0.9), ("r1", 1.0, 0.5)):
+            numbers = {"k1": (1.0, 0.01, "OK"), "k6": (k6, 0.01, "OK"), "m_p": (m_p, 0.001, "OK")}
+            known[f"{robot}/{day}"] = robot, START + day * DAY, numbers
     return written(folder, known)
 
 
 def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["report", str(batch(tmp_path)), "-o", str(tmp_path / "page")])
-    assert done.exit_code == 0, done.output
-    assert "2 robots, 20 logs: 1 drift and 1 payload" in done.stdout
-    assert "1 payload unlike the label: m_p of r0/0" in " ".join(done.stdout.split())
+    done = call("report", batch(tmp_path), "-o", tmp_path / "page")
+    assert done.code == 0, done
+    assert "2 robots, 20 logs: 1 drift and 1 payload" in done.out
+    assert "1 payload unlike the label: m_p of r0/0" in " ".join(done.out.split())
     written = sorted((tmp_path / "page").iterdir())
     assert [one.name for one in written] == ["findings.parquet", "fleet.html", "fleet.parquet"]
-    assert sorted(done.stderr.splitlines()) == [f"wrote {one}" for one in written]
+    assert sorted(done.err.splitlines()) == [f"wrote {one}" for one in written]
     assert pl.read_parquet(tmp_path / "page/fleet.parquet").height == 4
 
 
@@ -98,7 +93,7 @@ def test_the_page_is_two_tables_and_a_figure(tmp_path: Path) -> None:
 
 def test_a_name_that_attacks_is_text(tmp_path: Path) -> None:
     written(tmp_path, {"javascript:alert(1)": ("<b>r</b>", START, {"k1": (1.0, 0.01, "OK")})})
-    assert CliRunner().invoke(app, ["report", str(tmp_path)]).exit_code == 0
+    assert call("report", tmp_path).code == 0
     page = (tmp_path / "fleet.html").read_text(encoding="utf-8")
     assert 'href="javascript' not in page
     assert "<b>r</b>" not in page

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -18,7 +19,6 @@ from scipy import stats
 
 from algid.base.errors import ResultError
 from algid.base.significance import CERTAIN
-from algid.base.text import significant
 from algid.fleet.history import History, history_of
 from algid.fleet.page import finding_table, overview, robot_table, verdict
 from tests.report.pages import named, typed
@@ -65,16 +65,12 @@ def weighted_line(t: np.ndarray, y: np.ndarray, std: np.ndarray) -> dict[str, fl
     widened = max(1.0, math.sqrt(np.sum(((y - design @ found) / std) ** 2) / freedom))
     slope_std = widened * math.sqrt(np.linalg.inv(normal)[1, 1])
     p = 2 * stats.t.sf(abs(found[1]) / slope_std, freedom)
-    mean, mean_std = (
-        np.sum(y / std**2) / np.sum(1 / std**2),
-        widened / math.sqrt(np.sum(1 / std**2)),
-    )
     return {
         "slope": found[1],
         "slope_std": slope_std,
         "p": p,
-        "mean": mean,
-        "mean_std": mean_std,
+        "mean": np.average(y, weights=1 / std**2),
+        "mean_std": widened / math.sqrt(np.sum(1 / std**2)),
         "logs": t.size,
     }
 
@@ -146,36 +142,25 @@ def test_numbers_beyond_all_bounds_are_no_estimates(
     json.loads(history.as_json())
 
 
+# where half the logs are the median itself the scatter is the intervals' own, never less
+AS_TOLD = [0.0] * 7
+# deviations of 3 to both sides: 1.4826 times them is one robust deviation; scipy has more digits
+ROBUST = float(stats.median_abs_deviation([-3, 3, -3, 3, 0], scale="normal"))
+SCATTERED = [-3.0, 3, -3, 3, 0, -3, 3, -3, 3, 0]
+
+
+@pytest.mark.parametrize(("others", "unit"), [(AS_TOLD, 1.0), (SCATTERED, ROBUST)])
 @pytest.mark.parametrize(("away", "told"), [(5.99, False), (6.01, True), (-6.01, True)])
-def test_an_outlier_is_six_deviations_away(away: float, told: bool, tmp_path: Path) -> None:
-    """Where half the logs are the median itself the scatter is the intervals' own, never less."""
-    found = history_in(tmp_path, table([1.0] * 7 + [1.0 + 0.01 * away])).findings.filter(
-        kind="outlier"
-    )
-    assert found.height == told
-    if told:
-        expected = ("outlier", "r", "j7", "k1", 1.0 + 0.01 * away, 1.0)
-        assert (
-            found.select("kind", "robot", "job", "parameter", "value", "expected").row(0)
-            == expected
-        )
-        assert found["sigmas"][0] == pytest.approx(away, rel=1e-9)
-
-
-@pytest.mark.parametrize(("away", "told"), [(5.99, False), (6.01, True)])
-def test_logs_that_scatter_are_judged_by_their_scatter(
-    away: float, told: bool, tmp_path: Path
+def test_an_outlier_is_six_deviations_away(
+    others: list[float], unit: float, away: float, told: bool, tmp_path: Path
 ) -> None:
-    """Deviations of 3 standard deviations to both sides: 1.4826 times them is one robust
-    deviation.
-    """
-    # scipy has more digits of 1.4826
-    robust = stats.median_abs_deviation([-3, 3, -3, 3, 0], scale="normal")
-    values = [1 + 0.01 * one for one in (-3, 3, -3, 3, 0, -3, 3, -3, 3, away * robust)]
-    jobs = table([*values, 1.0])
-    assert jobs["k1"].median() == pytest.approx(1.0, abs=1e-12)
+    jobs = table([1 + 0.01 * one for one in (*others, away * unit)])
     found = history_in(tmp_path, jobs).findings.filter(kind="outlier")
-    assert found["job"].to_list() == (["j9"] if told else [])
+    assert found["job"].to_list() == [f"j{len(others)}"] * told
+    if told:
+        value = (1.0 + 0.01 * away * unit, pytest.approx(1.0))
+        assert found.select("robot", "parameter", "value", "expected").row(0) == ("r", "k1", *value)
+        assert found["sigmas"][0] == pytest.approx(away, rel=1e-3)
 
 
 @pytest.mark.parametrize(("payload", "told"), [(0.50492, False), (0.50494, True), (0.49506, True)])
@@ -184,14 +169,9 @@ def test_a_label_is_wrong_once_in_a_million(payload: float, told: bool, tmp_path
         [1.0] * 5, m_p=[0.5, 0.5, payload, 0.5, 0.5], m_p_std=[0.001] * 5, label_payload=[0.5] * 5
     )
     found = history_in(tmp_path, jobs).findings.filter(kind="payload")
-    assert found["job"].to_list() == (["j2"] if told else [])
+    assert found["job"].to_list() == ["j2"] * told
     if told:
-        assert found.select("kind", "parameter", "value", "expected").row(0) == (
-            "payload",
-            "m_p",
-            payload,
-            0.5,
-        )
+        assert found.select("parameter", "value", "expected").row(0) == ("m_p", payload, 0.5)
         assert found["sigmas"][0] == pytest.approx((payload - 0.5) / 0.001, rel=1e-9)
 
 
@@ -351,29 +331,10 @@ def test_a_wrong_label_is_found_however_few_the_logs(
     assert sorted(findings.filter(kind="payload")["job"]) == wrong
 
 
-def test_a_panic_of_the_library_is_a_refusal(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A damaged bitmap ends in one, which is no Exception."""
-
-    def panics(*_: object, **__: object) -> None:
-        raise pl.exceptions.PanicException("assertion failed: offset + length <= self.length")
-
-    path = tmp_path / "jobs.parquet"
-    fleet(1, 3, seed=1).write_parquet(path)
-    monkeypatch.setattr(pl, "scan_parquet", panics)
-    with pytest.raises(ResultError, match=r"jobs\.parquet: cannot read it \(assertion failed"):
-        history_of(path)
-
-
 def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: Path) -> None:
-    jobs = fleet(2, 120, seed=20)
     late = (pl.col("robot") == "r1") & (pl.col("time") >= START + timedelta(days=80))
-    replaced = jobs.with_columns(
-        pl.when(late).then(pl.col(name) * 1.05).otherwise(pl.col(name)).alias(name)
-        for name in ("k1", "k3")
-    )
-    history = history_in(tmp_path, replaced)
+    replaced = pl.when(late).then(pl.col("k1", "k3") * 1.05).otherwise(pl.col("k1", "k3"))
+    history = history_in(tmp_path, fleet(2, 120, seed=20).with_columns(replaced))
     found = history.findings  # the steps would be drifts of every window that holds them
     assert sorted(found.select("kind", "robot", "parameter").rows()) == [
         ("step", "r1", "k1"),
@@ -385,28 +346,20 @@ def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: P
     spread = 0.005 * np.sqrt(1 / 80 + 1 / 40)
     assert found["value"].to_numpy() == pytest.approx(0.05, abs=5 * spread)
     assert found["half"].to_numpy() == pytest.approx(stats.t.ppf(0.975, 118) * spread, rel=0.2)
+    assert verdict(history).headline == "2 robots, 240 logs: 2 steps"
     assert [one.text for one in verdict(history).reasons] == [
         "2 parameters changed at once: k1 of r1 and k3 of r1"
     ]
     shown = finding_table(history)
     assert "p < 9e-4; a step" in shown.note
     (row,) = [row for row in shown.rows if row[2] == "k1"]
-    step = found.filter(parameter="k1").row(0, named=True)
-    value, half = (
-        significant(100 * step[n] / step["expected"], 2 + (n == "value")) for n in ("value", "half")
-    )
-    distance = significant(step["sigmas"], 2)
-    assert row[1:6] == ("r1", "k1", "step", f"{value} ± {half} %", distance)
+    assert row[1:4] == ("r1", "k1", "step")
+    assert re.fullmatch(r"[45]\.\d+ ± 0\.\d+ %", row[4])
     assert row[6] == "2026-03-21 to 2026-03-22"
     assert [row[3] for row in robot_table(history).rows] == ["none", "2"]
-    assert verdict(history).headline == "2 robots, 240 logs: 2 steps"
     plot = overview(history)
-    assert plot is not None
-    panels = [one["text"] for one in plot.layout["annotations"]]
-    assert panels == ["<b>r1: k1, kg m²</b>", "<b>r1: k3, kg m²</b>"]
     lines = [one[end] for one in plot.layout["shapes"] for end in ("x0", "x1")]
     assert lines == [pytest.approx((START + timedelta(days=80)).timestamp() * 1000)] * 4
-    assert {one["name"] for one in plot.data} == {"log", "mean"}
     assert len(named(plot.data, "mean")) == 4  # no line leads across the change
 
 
