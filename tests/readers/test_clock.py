@@ -104,17 +104,6 @@ def test_all_samples_may_come_a_few_places_late(apart: int, fits: bool) -> None:
             ordered(table(order))
 
 
-@pytest.mark.parametrize(("repeats", "fits"), [(20, True), (21, False)])
-def test_half_of_the_stamps_may_repeat(repeats: int, fits: bool) -> None:
-    stamps = np.concatenate([np.arange(40 - repeats), np.full(repeats, 39 - repeats)])
-    if fits:
-        _, (said,) = ordered(table(stamps))
-        assert said.text.startswith("20 samples repeat a stamp; the first of each was kept; 20 ")
-    else:
-        with pytest.raises(LogError, match="time stands still: 21 of 40 stamps as the one before"):
-            ordered(table(stamps))
-
-
 @pytest.mark.parametrize("cut", [None, 6])
 def test_a_repeated_stamp_is_a_loss_where_its_values_are_others(cut: int | None) -> None:
     """In a table, and across two."""

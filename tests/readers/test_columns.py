@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from algid.base.errors import LogError
-from algid.base.text import joined
 from algid.log import Companion
 from algid.notices import Notice
 from algid.profile import Profile
@@ -75,26 +74,6 @@ def test_two_of_numbered_joints_are_called_by_number_word_or_column(forms: str, 
         joints = [called.format(first + 2), called.format(first + 1)]
         assert chosen(columns, joints=joints) == {"t": "t", **wanted}
     assert "there are: " in refused(columns, {"joints": ["8", "9"]})
-
-
-def test_columns_that_are_missing_are_named_with_the_flags_that_name_them() -> None:
-    assert refusal("q1 q2 tau1") == (
-        "no column for t, tau1, tau2; found 'q1', 'q2' and 'tau1'; name them: "
-        "--set time=NAME --set tau1.source=NAME "
-        "--set tau2.source=NAME; "
-        "or give the samples a second of a log without a time: --rate HZ; "
-        "or take them from another file: --torque-file FILE; "
-        "a PD law makes them of q_des, kp and kd of [tau1] and [tau2] (algid guide logs)"
-    )
-    many = " ".join(f"c{place:02d}" + "x" * 60 for place in range(18))
-    told = refusal(many)
-    assert told.count("'c") == 16
-    assert f"'c15{'x' * 37}' and 2 more; name them" in told
-    assert refusal(PLAIN, {"theta2": {"source": "angle"}}) == (
-        "theta2 is to be taken from 'angle', which is not there; found "
-        f"{joined([*map(repr, PLAIN.split())])}; "
-        "name another: --set theta2.source=NAME"
-    )
 
 
 def test_columns_that_were_written_must_be_there() -> None:
@@ -263,12 +242,6 @@ def test_joints_told_that_stand_there_twice_or_not_at_all() -> None:
     assert "joints there are: none that their names show" in told
     told = refused([f"pos{joint}" for joint in range(1, 10)])
     assert "'pos' stands there for 9 joints: 1, 2, 3, 4, 5, 6, 7, 8;" in told
-
-
-def test_a_name_written_twice_is_refused_but_where_its_column_is_told() -> None:
-    columns = ["t", "q1", "q_01 [deg]", "q2", "tau1", "tau2"]
-    assert "'q_01 [deg]' and 'q1' are both q of joint 1" in refused(columns)
-    assert chosen(columns, theta1={"source": "q1"})["theta2"] == "q2"
 
 
 def test_a_time_is_known_by_its_whole_name_first() -> None:

@@ -90,11 +90,6 @@ def test_signs_and_offsets_of_channels_and_joints_add_up() -> None:
     }
 
 
-def test_the_torque_of_a_joint_without_motor_needs_no_unit() -> None:
-    found = readings({"passive": 2}, {"tau2": "deg"})
-    assert (found["tau2"].source, found["tau2"].factor) == ("none: no motor", 0)
-
-
 SIGNALS = np.random.default_rng(7).normal(size=(8, 50))
 
 

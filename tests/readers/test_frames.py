@@ -17,7 +17,7 @@ import pytest
 
 from algid.base.errors import LogError
 from algid.profile import Profile
-from algid.readers import open_log, read_log
+from algid.readers import read_log
 
 ROWS = 20_000
 """Samples that the message of other joints speaks of."""
@@ -50,48 +50,6 @@ def test_more_columns_than_any_log_has_are_refused_in_every_format(tmp_path: Pat
         write(frame, tmp_path / f"log.{form}")
         with pytest.raises(LogError, match="more than 4096 columns"):
             read_log(tmp_path / f"log.{form}")
-    matrices: dict[str, Any] = {f"q{place}": np.zeros((5, 64)) for place in range(64)}
-    np.savez(tmp_path / "log.npz", t=np.arange(5), **matrices)
-    with pytest.raises(LogError, match="more than 4096 columns"):
-        read_log(tmp_path / "log.npz")
-
-
-OWN = {"q1": "theta1", "q2": "theta2"}
-
-
-@pytest.mark.parametrize(("slower", "told"), [(500, True), (200, False), (201, True)])
-def test_a_clock_too_slow_for_an_arm_is_told_once(slower: int, told: bool, tmp_path: Path) -> None:
-    """algid's own names mean seconds: below 5 Hz these are said to be doubtful, unless the user
-    told them.
-    """
-    path = tmp_path / "log.csv"
-    arm(30, 2).with_columns(t=pl.col("t") * slower).rename(OWN).write_csv(path)
-    said = [notice for block in open_log(path).blocks(10) for notice in block.notices]
-    text = (
-        f"times in 't' are taken for s, which makes {1000 / slower:.3g} Hz, too slow for an arm "
-        "in motion: "
-        "if they are in ms: --set time_unit=ms"
-    )
-    assert [(notice.code, notice.clause) for notice in said] == [("OTHER_UNIT", text)] * told
-    assert read_log(path, Profile(time_unit="s")).notices == ()
-
-
-def test_of_wide_lists_the_first_places_are_taken(tmp_path: Path) -> None:
-    """A list of a hundred numbers is no arm's; a row that is shorter than others lacks a value."""
-    rows = [[0.1 * place for place in range(100)]] * 9
-    frame = pl.DataFrame({"t": np.arange(9) * 1e-3, "q": rows, "tau": [[1.0, 2.0]] * 8 + [[1.0]]})
-    for form, write in WRITERS.items():
-        write(frame, tmp_path / f"log.{form}")
-        with pytest.raises(
-            LogError, match="'q' stands there for 64 joints: 0, 1, 2, 3, 4, 5, 6, 7"
-        ):
-            read_log(tmp_path / f"log.{form}")
-        log = read_log(
-            tmp_path / f"log.{form}",
-            Profile.model_validate({"theta1": {"source": "q[62]"}, "joints": ["0", "1"]}),
-        )
-        assert np.allclose(log.theta[0], 6.2, rtol=1e-12)
-        assert [notice.code for notice in log.notices if notice.lossy] == ["CUT_OFF"]
 
 
 SHORT = 300

@@ -60,25 +60,6 @@ def header(stamp: int, frame: str) -> Any:
     return made("std_msgs/msg/Header", stamp=time, frame_id=frame)
 
 
-def joint_state(stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
-    """Three joints in any order, the gripper's numbers made up."""
-    order = draw.permutation(3)
-    position, effort = (
-        np.array([*pair, draw.normal()])[order] for pair in (values[:2], values[2:])
-    )
-    names = [["shoulder", "elbow", "gripper"][place] for place in order]
-    kind = "sensor_msgs/msg/JointState"
-    frame = "f" * int(draw.integers(0, 9))
-    return made(
-        kind,
-        header=header(stamp, frame),
-        name=names,
-        position=position,
-        velocity=np.empty(0),
-        effort=effort,
-    )
-
-
 def dynamic(stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
     """Joints and interfaces in any order."""
     joints = []
@@ -97,19 +78,6 @@ def dynamic(stamp: int, values: Sequence[float], draw: np.random.Generator) -> A
         )
     kind = "control_msgs/msg/DynamicJointState"
     return made(kind, header=header(stamp, ""), joint_names=names, interface_values=joints)
-
-
-def array(_stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
-    """Numbers without names, dimensions of any label."""
-    dimension = made(
-        "std_msgs/msg/MultiArrayDimension", label="x" * int(draw.integers(0, 6)), size=5, stride=5
-    )
-    layout = made(
-        "std_msgs/msg/MultiArrayLayout", dim=[dimension] * int(draw.integers(0, 3)), data_offset=0
-    )
-    return made(
-        "std_msgs/msg/Float64MultiArray", layout=layout, data=np.array([draw.normal(), *values])
-    )
 
 
 def custom(_stamp: int, values: Sequence[float], draw: np.random.Generator) -> Any:
@@ -152,13 +120,11 @@ class Kind:
     profile: dict[str, Any]
 
 
-JOINTS = {"joints": ["shoulder", "elbow"]}
 STATE = ("joints[0].angle", "joints[1].angle", "joints[0].torques[1]", "joints[1].torques[1]")
-ARRAY = ("data[1]", "data[2]", "data[3]", "data[4]")
+
+
 KINDS = (
-    Kind("sensor_msgs/msg/JointState", joint_state, JOINTS),
-    Kind("control_msgs/msg/DynamicJointState", dynamic, JOINTS),
-    Kind("std_msgs/msg/Float64MultiArray", array, indexed(*ARRAY)),
+    Kind("control_msgs/msg/DynamicJointState", dynamic, {"joints": ["shoulder", "elbow"]}),
     Kind("lab/msg/State", custom, indexed(*STATE)),
 )
 

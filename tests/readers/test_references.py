@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -40,24 +39,6 @@ def test_columns_are_found_by_their_names(names: str) -> None:
     found = read(PLAIN | columns(names, REFERENCE))
     assert np.array_equal(found.reference, REFERENCE)
     assert np.array_equal(found.theta, THETA)  # a commanded angle is none
-
-
-def test_a_profile_names_them_and_they_are_recorded_as_the_angles_are() -> None:
-    angles, asked = (np.degrees([signal[0], signal.sum(axis=0)]) for signal in (THETA, REFERENCE))
-    made = columns("t,q1,q2,tau1,tau2,one,two", T, angles, TAU, asked)
-    unit = {"unit": "deg"}
-    settings: dict[str, Any] = {
-        "theta1": unit,
-        "theta2": unit,
-        "q_des1": {"source": "one"},
-        "q_des2": {"source": "two"},
-        "second_angle": "absolute",
-        "zero": "hanging",
-    }
-    found = read(made, **settings).reference
-    assert found == pytest.approx(REFERENCE - np.array([[math.pi / 2], [0.0]]))
-    settings["q_des1"] = {"source": "one", "unit": "rad"}
-    assert read(made, **settings).reference[0] == pytest.approx(asked[0] - math.pi / 2)
 
 
 @pytest.mark.parametrize(

@@ -227,13 +227,6 @@ def test_words_that_are_no_joints_are_let_be(header: str, tmp_path: Path) -> Non
     assert read_log(table(header)(tmp_path)).origin.mapping["theta1"] == "q1"
 
 
-def test_units_are_known_as_people_write_them() -> None:
-    profile = Profile.model_validate(
-        {"theta1": {"unit": "degrees"}, "time_unit": "milliseconds", "tau1": {"unit": "N.m"}}
-    )
-    assert (profile.theta1.unit, profile.time_unit, profile.tau1.unit) == ("deg", "ms", "N m")
-
-
 @pytest.mark.parametrize(
     ("text", "told"),
     [

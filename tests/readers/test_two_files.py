@@ -16,7 +16,6 @@ from algid.notices import Notice
 from algid.profile import Profile
 from algid.readers import read_log
 from tests.readers.logs import EPOCH_NS
-from tests.readers.ways import Message, States, written
 
 ROWS = 4000
 STAMPS = EPOCH_NS + np.arange(ROWS) * 1_000_000
@@ -100,21 +99,6 @@ def test_joints_by_name_stand_in_the_order_of_the_angles(tmp_path: Path) -> None
     assert np.array_equal(log.tau, TAU)
     swapped = read(path, torque_file="t.parquet", joints=("elbow", "shoulder"))
     assert np.array_equal(swapped.tau, TAU[::-1])
-
-
-def test_messages_without_effort_take_a_table_of_torques(tmp_path: Path) -> None:
-    names = ("shoulder", "elbow")
-    messages = [
-        Message(theta, (), stamp, stamp, names)
-        for theta, stamp in zip(THETA.T.tolist(), STAMPS.tolist(), strict=True)
-    ]
-    path = written("cdr", tmp_path, States(messages))
-    with pytest.raises(LogError, match="effort"):
-        read_log(path)
-    torques(tmp_path, names=("Joint_1_torque", "Joint_2_torque"))
-    log = read(path)
-    assert np.array_equal(log.theta, THETA)
-    assert np.array_equal(log.tau, TAU)
 
 
 def test_columns_of_either_file_are_named_and_turned(tmp_path: Path) -> None:
