@@ -192,15 +192,6 @@ def test_an_output_where_no_record_can_be_kept_is_refused_before_any_work(
         pass
 
 
-def test_an_estimate_of_a_foreign_name_harms_no_other_column(logs: Path) -> None:
-    out = logs.parent / "out"
-    forged = _sound() | {"estimates": {"k1": [1.0, 2.0, "OK"], "label_site": [1.0, 2.0, "OK"]}}
-    (out / ".jobs").mkdir(parents=True)
-    (out / ".jobs/other.json").write_text(json.dumps(forged))
-    _run(logs, out)
-    assert pl.read_parquet(out / "jobs.parquet")["k1"].to_list() == [None, None, 1.0]
-
-
 def test_the_table_is_written_for_changes_alone_and_touched_logs_run_again(logs: Path) -> None:
     out = logs.parent / "out"
     here = Here(_fail)

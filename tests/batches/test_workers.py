@@ -67,18 +67,6 @@ def test_a_call_whose_worker_is_killed_runs_in_three_at_most(
     assert (tmp_path / "b").stat().st_size == 3
 
 
-@pytest.mark.slow
-def test_a_call_past_its_time_fails_alone_and_its_worker_is_replaced() -> None:
-    with Workers(1, timeout=3.0) as executor:
-        futures = [executor.submit(calls.spin), executor.submit(calls.add, 1, 1)]
-        with pytest.raises(
-            CallFailedError,
-            match="longer than 3 s; raise --timeout, and run it again with --retry-f",
-        ):
-            futures[0].result(timeout=60)
-        assert futures[1].result(timeout=60) == 2
-
-
 def test_workers_that_are_ended_leave_no_process(tmp_path: Path) -> None:
     executor = Workers(2)
     told = tmp_path / "pid"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator
-from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -318,10 +317,3 @@ def test_tables_of_the_guide_and_the_readme_are_those_of_the_code() -> None:
 def test_a_keyword_is_refused_as_its_flag_is(ask: Callable[[], object], named: str) -> None:
     with pytest.raises(SettingError, match=f"^{named}"):
         ask()
-
-
-@pytest.mark.parametrize("year", ["1970", "2037"])
-def test_dates_that_stamps_can_hold_are_taken(year: str) -> None:
-    options: dict[str, Any] = {"duration": 0.1, "start_time": f"{year}-01-02"}
-    stamps = algid.synthesise("case1", **options)[0].stamp_ns
-    assert datetime.fromtimestamp(stamps[0] / 1e9, UTC) == datetime(int(year), 1, 2, tzinfo=UTC)

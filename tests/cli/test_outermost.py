@@ -134,8 +134,6 @@ def test_a_full_standard_output_is_one_line_of_every_command(result: Path, tmp_p
         ("inspect", log),
         ("identify", log, "-o", tmp_path, "--no-report"),
         ("validate", result, log, "--format", "json"),
-        ("validate", result, "--max-error", "50"),
-        ("compare", result, result),
         ("report", result),
         ("synth", "case1", "-o", tmp_path, "--duration", "0.1"),
         ("inspect", log, "--write-profile", tmp_path / "new.toml"),
@@ -143,18 +141,11 @@ def test_a_full_standard_output_is_one_line_of_every_command(result: Path, tmp_p
     for arguments in calls:
         with Path("/dev/full").open("wb") as full, (tmp_path / "err").open("wb") as err:
             code = begin(*arguments, stdout=full.fileno(), stderr=err.fileno())()
-        told = [
-            line
-            for line in (tmp_path / "err").read_text().splitlines()
-            if not line.startswith(("wrote", "note"))
-        ]
+        lines = (tmp_path / "err").read_text().splitlines()
+        told = [line for line in lines if not line.startswith(("wrote", "note"))]
         assert code == 2, arguments
-        assert told == [
-            (
-                "algid: standard output: No space left on device; mend that and run it again, or "
-                "see where with ALGID_TRACEBACK=1"
-            )
-        ], arguments
+        assert len(told) == 1, arguments
+        assert told[0].startswith("algid: standard output: No space left on device; mend that")
 
 
 def test_a_full_standard_error_changes_no_exit_code(tmp_path: Path) -> None:

@@ -7,29 +7,18 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import algid
-from algid.identification.identify import identify
-from algid.log import Log
-from algid.settings import Settings
 from tests.processes import Outcome
 from tests.terminals import on_a_terminal
 
 
 @pytest.fixture(scope="module")
-def log() -> Log:
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     found, _ = algid.synthesise("case1", duration=2.0, torque="wide", torque_noise=1e-2, seed=1)
-    return replace(found, omega=None)
-
-
-@pytest.fixture(scope="module")
-def path(log: Log, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from algid.writers import write_log
-
     path = tmp_path_factory.mktemp("progress") / "log.parquet"
-    write_log(path, log)
+    algid.write_log(path, replace(found, omega=None))
     return path
 
 
@@ -60,22 +49,3 @@ def test_a_pipe_gets_none_of_it(command: str, path: Path, tmp_path: Path) -> Non
     colour = {**os.environ, "FORCE_COLOR": "1"}  # asks for colour, not for a terminal's bars
     done = Outcome(command, *arguments[command], env=colour)
     assert (done.code, done.err) == (0, "")
-
-
-@pytest.mark.parametrize("estimator", ["refined", "weak", "paper"])
-def test_every_stage_comes_to_its_end(estimator: str, log: Log, tmp_path: Path) -> None:
-    calls: list[tuple[str, int, int]] = []
-    settings = Settings(estimator=estimator)
-    other = replace(log, tau=np.random.default_rng(0).normal(log.tau, 1e-2))  # else it is the same
-    logs = [log, other] if estimator != "paper" else log
-    identify(logs, None, settings, out=tmp_path, progress=lambda *c: calls.append(c))
-    stages = dict.fromkeys(stage for stage, _, _ in calls)
-    samples = (2 if estimator != "paper" else 1) * len(log)
-    assert next(iter(stages)) == "reading"
-    assert list(stages)[-1] == "report"
-    for stage in stages:
-        done = [(done, total) for told, done, total in calls if told == stage and total]
-        assert all(0 <= one <= total for one, total in done)
-        # whose last one is the first log's alone
-        if done and not (stage == "series" and estimator == "refined"):
-            assert done[-1] == (samples, samples)

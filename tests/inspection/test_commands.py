@@ -45,17 +45,6 @@ def test_inspect_tells_what_a_log_is(kind: str, tmp_path: Path) -> None:
     }
 
 
-def test_inspect_tells_types_and_counts_of_flat_logs(tmp_path: Path) -> None:
-    write_log(tmp_path / "arm.parquet", moving_log())
-    write_log(tmp_path / "arm.csv", moving_log())
-    table, text = (
-        [(one.name, one.type, one.count) for one in inspect_log(tmp_path / name).entries]
-        for name in ("arm.parquet", "arm.csv")
-    )
-    assert table == [*((name, "double", 6000) for name, _, _ in text), ("stamp_ns", "int64", 6000)]
-    assert {one[1:] for one in text} == {("double", None)}
-
-
 def test_inspect_works_on_what_it_refuses(tmp_path: Path) -> None:
     path = tmp_path / "arm.csv"
     path.write_text("time,<b>a\x1b[31m</b>,q2\n0,1,2\n1,2,3\n".replace("\x1b", "\u0085"))
