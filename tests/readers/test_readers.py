@@ -19,9 +19,6 @@ from algid.readers import read_log
 from algid.writers import FORMATS, write_log
 from tests.readers.logs import same
 
-CSV = "t,theta1,theta2,tau1,tau2\n"
-
-
 FINITE = st.floats(-1e29, 1e29, allow_subnormal=True)
 
 
@@ -72,23 +69,3 @@ def test_a_repeated_first_stamp_is_dropped_and_told(shared_data: Path) -> None:
 def test_logs_without_joints_are_refused(name: str, shared_data: Path) -> None:
     with pytest.raises(LogError, match="topic"):
         read_log(shared_data / "mcap" / name)
-
-
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        (
-            CSV + "0,1,2,3,4\n0.1,1,x,3,4\n0.2,1,2,3,4\n",
-            "could not parse `x` .* column '3: theta2'",
-        ),
-        (CSV + "0,1,2,3,4\n0.1,1,2,3,4,5\n0.2,1,2,3,4\n", "row 2 has more cells"),
-        ("t,theta1,theta1,tau1,tau2\n0,1,2,3,4\n", "twice"),
-    ],
-)
-def test_bad_csv_is_refused_in_one_clear_line(text: str, told: str, tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
-    path.write_text(text)
-    with pytest.raises(LogError, match=told) as caught:
-        read_log(path)
-    assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
