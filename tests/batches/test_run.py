@@ -23,7 +23,7 @@ from algid.batches.discover import jobs_of
 from algid.batches.job import Task
 from algid.batches.jobs import Input, Job, JobStatus, stat_of
 from algid.batches.run import Batch, Batched, locked
-from algid.batches.workers import CallFailedError, WorkerDiedError
+from algid.batches.workers import CallFailedError
 from algid.identification.identify import identify
 from algid.notices import Notice, Verdict
 from algid.results import Result
@@ -160,19 +160,6 @@ def test_a_changed_file_of_torques_is_another_log(made: Path, tmp_path: Path) ->
         k4.append(done.records[0].estimates["k4"][0])
     assert (done.ran, k4[1]) == (1, k4[0])
     assert k4[2] == pytest.approx(2 * k4[0], rel=1e-6)
-
-
-def test_a_job_that_kills_its_workers_is_set_aside(logs: Path) -> None:
-    def die(name: str) -> None:
-        if name == "r1/a":
-            raise WorkerDiedError("the worker was ended by SIGKILL")
-
-    ended = _run(logs, Here(die))
-    assert [record.status for record in ended.records] == [
-        JobStatus.FAILED,
-        JobStatus.KILLED,
-        JobStatus.OK,
-    ]
 
 
 def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(

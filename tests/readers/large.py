@@ -22,7 +22,7 @@ from tests.readers.mcaps import TOPIC, joint_state
 def _messages(rows: int, *, ros1: bool = False) -> Iterator[tuple[str, int, bytes]]:
     """Joint states as ROS 2 or ROS 1 writes them: only their stamps differ."""
     values = [(1.0, 2.0), (3.0, 4.0), (5.0, 6.0)]
-    body = joint_state(0, ("joint1", "joint2"), *values).done()
+    body = joint_state(0, ("joint1", "joint2"), *values)
     if ros1:
         names = b"".join(struct.pack("<I", 6) + name for name in (b"joint1", b"joint2"))
         lists = b"".join(struct.pack("<I2d", 2, *pair) for pair in values)

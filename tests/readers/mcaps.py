@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
+from rosbags.typesys import Stores, get_typestore
 
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log
@@ -18,52 +17,31 @@ from algid.log import Log
 TOPIC = "/joint_states"
 
 
-@dataclass
-class Cdr:
-    """A CDR message under construction, little endian or big."""
-
-    order: str = "<"
-    data: bytes = b""
-
-    def put(self, kind: str, *values: Any) -> Cdr:
-        """Append numbers of a struct type, each aligned to its size."""
-        for value in values:
-            width = struct.calcsize(kind)
-            self.data += bytes(-len(self.data) % width) + struct.pack(self.order + kind, value)
-        return self
-
-    def text(self, value: str) -> Cdr:
-        """Append a string."""
-        self.put("I", len(value.encode()) + 1)
-        self.data += value.encode() + b"\0"
-        return self
-
-    def list(self, kind: str, values: Sequence[float]) -> Cdr:
-        """Append a sequence of numbers."""
-        return self.put("I", len(values)).put(kind, *values)
-
-    def done(self, representation: int | None = None) -> bytes:
-        """The message with its encapsulation."""
-        number = (1 if self.order == "<" else 0) if representation is None else representation
-        return bytes([0, number, 0, 0]) + self.data
+STORES = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
+"""The types of ROS 1 and 2."""
 
 
-def joint_state(
+def state_of(
+    store: Any,
     stamp_ns: int,
     names: Sequence[str] = ("joint1", "joint2"),
     position: Sequence[float] = (),
     velocity: Sequence[float] = (),
     effort: Sequence[float] = (),
-    *,
-    frame: str = "",
-    order: str = "<",
-) -> Cdr:
-    """A sensor_msgs/msg/JointState."""
-    message = Cdr(order).put("i", stamp_ns // 10**9).put("I", stamp_ns % 10**9).text(frame)
-    message.put("I", len(names))
-    for name in names:
-        message.text(name)
-    return message.list("d", position).list("d", velocity).list("d", effort)
+    **head: Any,
+) -> Any:
+    """A joint state of either; `head` is what its header has beside the stamp."""
+    kinds = ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", JOINT_STATE)
+    time, header, state = (store.types[kind] for kind in kinds)
+    stamp = time(*divmod(stamp_ns, 10**9))
+    lists = (np.array(values, float) for values in (position, velocity, effort))
+    return state(header(stamp=stamp, **{"frame_id": "", **head}), list(names), *lists)
+
+
+def joint_state(stamp_ns: int, *values: Any, order: str = "<", **more: Any) -> bytes:
+    """A joint state in CDR, little endian or big."""
+    message = state_of(STORES[1], stamp_ns, *values, **more)
+    return bytes(STORES[1].serialize_cdr(message, JOINT_STATE, little_endian=order == "<"))
 
 
 Schema = tuple[str, str, bytes]
@@ -110,21 +88,13 @@ NO_INDEX: dict[str, Any] = {
 
 def messages_of(log: Log, **options: Any) -> list[tuple[str, int, bytes]]:
     """The log's samples as JointState messages."""
-    omega = log.omega if log.omega is not None else np.empty((0, len(log)))
-    return [
-        (
-            TOPIC,
-            stamp,
-            joint_state(
-                stamp,
-                position=log.theta[:, row].tolist(),
-                velocity=omega[:, row].tolist(),
-                effort=log.tau[:, row].tolist(),
-                **options,
-            ).done(),
-        )
-        for row, stamp in enumerate(log.stamp_ns.tolist())
-    ]
+    found = []
+    for row, stamp in enumerate(log.stamp_ns.tolist()):
+        theta, tau = log.theta[:, row], log.tau[:, row]
+        omega = () if log.omega is None else log.omega[:, row]
+        data = joint_state(stamp, position=theta, velocity=omega, effort=tau, **options)
+        found.append((TOPIC, stamp, data))
+    return found
 
 
 def protobuf_file(*fields: tuple[str, int, int], name: str = "State") -> Any:

@@ -41,14 +41,6 @@ def parquet(folder: Path, **beside: object) -> Path:
     return folder / "log.parquet"
 
 
-@pytest.mark.parametrize("piece", ["_", "a_", "[", " ", "1", "/"])
-def test_a_long_name_of_a_column_is_passed_over(piece: str, tmp_path: Path) -> None:
-    name = "q" + piece * 500_000
-    assert len(read_log(parquet(tmp_path, **{name: [0.0] * 300, f"{name}x": [0.0] * 300}))) == 300
-    header = f"{','.join(COLUMNS)},{name[:30_000]},9{name[2:30_000]}x"
-    assert len(read_log(csv(tmp_path, header, *(f"{row},0,0" for row in ROWS)))) == 300
-
-
 def test_a_name_beyond_the_bound_is_its_own_stem(limited: Limited) -> None:
     take_apart.cache_clear()
     limited(name_letters=6)

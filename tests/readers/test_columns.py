@@ -233,17 +233,6 @@ def test_the_pair_chosen(columns: str, joints: tuple[str, str] | None, chosen: s
     assert {"theta2", "tau1", "tau2"} < found.keys()
 
 
-def test_joints_told_that_stand_there_twice_or_not_at_all() -> None:
-    columns = ["t", "/a/x/position", "/b/x/position", "/a/y/position", "/a/x/effort", "/a/y/effort"]
-    told = refused(columns, {"joints": ["x", "y"]})
-    assert told.startswith("no columns of the joints x, y; joints there are: x, y; choose two")
-    assert chosen(columns, joints=["/a/x", "y"])["theta1"] == "/a/x/position"
-    told = refused(["t", "alpha", "beta"], {"joints": ["1", "2"]})
-    assert "joints there are: none that their names show" in told
-    told = refused([f"pos{joint}" for joint in range(1, 10)])
-    assert "'pos' stands there for 9 joints: 1, 2, 3, 4, 5, 6, 7, 8;" in told
-
-
 def test_a_time_is_known_by_its_whole_name_first() -> None:
     others = PLAIN.split()[1:]
     assert chosen(["time [ms]", "T", *others])["t"] == "T"

@@ -221,23 +221,6 @@ def test_a_chunk_that_breaks_off_yields_its_whole_messages(
     assert "an unfinished chunk" in lost(found)["CUT_OFF"]
 
 
-def test_a_file_of_which_damage_left_nothing_says_so_and_where(tmp_path: Path) -> None:
-    path = tmp_path / "log.mcap"
-    whole = made(path, LOG, compression=PLAIN, chunk_size=1 << 20)
-    (chunk,) = chunks_of(path)
-    place = chunk.chunk_start_offset
-    broken = flipped(whole, LOG.theta[0, 50])
-    name = broken.rindex(b"JointState")  # in the summary
-    for content, words in (
-        (broken, rf".*checksum.*byte {place}\)"),
-        (poked(broken, name, "<B", broken[name] ^ 1), "its summary: its checksum is wrong; "),
-        (whole[: place + 100], f".*breaks off at byte {place}"),
-    ):
-        path.write_bytes(content)
-        with pytest.raises(LogError, match=rf"damaged \({words}.*no topic"):
-            read_log(path)
-
-
 def test_the_truth_in_the_metadata_is_read_where_it_can_be(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     write_log(path, LOG, truth=TRUTH)

@@ -17,7 +17,6 @@ from algid.base.errors import LogError
 from algid.inspection.checks import inspect_log
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.readers.formats import format_of
 from tests.readers.logs import EPOCH_NS, noise_log
 
 LOG = noise_log(60, start_ns=EPOCH_NS)
@@ -78,12 +77,6 @@ def test_an_array_that_stands_twice_in_an_archive_is_refused(tmp_path: Path) -> 
         archive.writestr("tau.npy", b"")
     with pytest.raises(LogError, match=r"a\.npz: the array 'tau\.npy' stands in the archive twice"):
         read_log(path)
-
-
-@pytest.mark.parametrize("text", ["{\n}\n", "{1}\n{2}\n", '{"a": 1}'])
-def test_other_text_is_no_json_lines(text: str, tmp_path: Path) -> None:
-    (tmp_path / "a.jsonl").write_text(text)
-    assert format_of(tmp_path / "a.jsonl").name == "csv"
 
 
 def written_hdf5(path: Path) -> Path:

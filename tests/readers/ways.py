@@ -21,11 +21,18 @@ import scipy.io
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
-from rosbags.typesys import Stores, get_typestore
 
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log
-from tests.readers.mcaps import ANY, Schema, joint_state, protobuf_schema, write_mcap
+from tests.readers.mcaps import (
+    ANY,
+    STORES,
+    Schema,
+    joint_state,
+    protobuf_schema,
+    state_of,
+    write_mcap,
+)
 
 EPOCH = 1_700_000_000_000_000_000
 FLAT = [
@@ -39,7 +46,6 @@ _WITH_ATTRIBUTES = {"csv", "tsv", "parquet", "feather", "npz", "mat", "h5", "pan
 _MASKED = {"parquet", "feather", "dict", "pandas", "polars", "arrays"}
 _ZONED = {"csv", "tsv", "jsonl", "parquet", "feather", "pandas", "polars"}
 CANONICAL = ["time", "q1", "q2", "tau1", "tau2"]
-STORES = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 
 
 class CannotSayError(Exception):
@@ -360,10 +366,9 @@ def json_mcap(
 def _cdr(folder: Path, log: States) -> Path:
     rows = []
     for one in log.messages:
-        message = joint_state(
-            one.stamp, one.name, one.position, one.velocity, one.effort, frame=one.frame
-        )
-        rows.append((one.topic, one.log_stamp, message.done()))
+        values = (one.name, one.position, one.velocity, one.effort)
+        data = joint_state(one.stamp, *values, frame_id=one.frame)
+        rows.append((one.topic, one.log_stamp, data))
     schema = (JOINT_STATE, "ros2msg", log.definition.encode())
     return write_mcap(folder / "log.mcap", rows, schema, metadata=log.metadata)
 
@@ -456,28 +461,19 @@ def bag2(
     return path
 
 
-def _fill(writer: Any, store: Any, log: States, head: Mapping[str, int]) -> None:
+def _fill(writer: Any, store: Any, log: States, head: Mapping[str, Any]) -> None:
     """Write joint states into a bag; `head` is what its headers have beside ROS 2's."""
     _usual_definition(log)
     if log.metadata:
         raise CannotSayError
-    of_type = "sensor_msgs/msg/JointState"
-    names = ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", of_type)
-    time, header, state = (store.types[name] for name in names)
     serialize = store.serialize_ros1 if head else store.serialize_cdr
     connections: dict[str, Any] = {}
     for one in log.messages:
         if one.topic not in connections:
-            connections[one.topic] = writer.add_connection(one.topic, of_type, typestore=store)
-        stamp = time(sec=one.stamp // 10**9, nanosec=one.stamp % 10**9)
-        message = state(
-            header=header(stamp=stamp, frame_id=one.frame, **head),
-            name=list(one.name),
-            position=np.array(one.position, float),
-            velocity=np.array(one.velocity, float),
-            effort=np.array(one.effort, float),
-        )
-        writer.write(connections[one.topic], one.log_stamp, serialize(message, of_type))
+            connections[one.topic] = writer.add_connection(one.topic, JOINT_STATE, typestore=store)
+        values = (one.name, one.position, one.velocity, one.effort)
+        message = state_of(store, one.stamp, *values, frame_id=one.frame, **head)
+        writer.write(connections[one.topic], one.log_stamp, serialize(message, JOINT_STATE))
 
 
 _MESSAGE_WAYS: dict[str, Callable[[Path, States], Path]] = {
