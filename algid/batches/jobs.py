@@ -288,5 +288,4 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
         for name, numbers in one.estimates.items():
             row |= zip((name, f"{name}_std", f"{name}_status"), numbers, strict=True)
         rows.append(row)
-    columns = {name: [row.get(name) for row in rows] for name in kinds}
-    return pl.DataFrame(columns, kinds, strict=False)
+    return pl.DataFrame(rows, kinds, strict=False)

@@ -57,12 +57,12 @@ def _open_one(path: str | Path | FrameOrArrays, profile: Profile) -> TableReader
         if not isinstance(found, TableFile):
             from algid.readers.messages.offer import offer_messages
 
-            return open_offered(offer_messages(found, profile), profile)
+            return open_offered(str(path), offer_messages(found, profile), profile)
     else:
-        from algid.readers.memory import open_columns
+        from algid.readers.memory import NAME, open_columns
 
-        found = open_columns(path)
-    return open_offered(offer_table(found, profile), profile)
+        found, path = open_columns(path), NAME
+    return open_offered(str(path), offer_table(found, profile), profile)
 
 
 def read_log(path: str | Path | FrameOrArrays, profile: Profile | None = None) -> Log:

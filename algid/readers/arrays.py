@@ -46,8 +46,8 @@ def open_arrays(path: Path, kind: str) -> TableFile:
     readers = {"npz": ("NumPy", _of_npz), "mat": ("MATLAB", _of_mat), "hdf5": ("HDF5", _of_hdf5)}
     title, read = readers[kind]
     _refuse_large(path.stat().st_size)
-    with as_log_error(path, title):
-        return of_arrays(str(path), kind, *read(path))
+    with as_log_error(title):
+        return of_arrays(kind, *read(path))
 
 
 def _refuse_large(size: int) -> None:
@@ -155,7 +155,6 @@ def _of_hdf5(path: Path) -> Read:
 
 
 def of_arrays(
-    path: str,
     kind: str,
     arrays: Mapping[str, NDArray[Any]],
     attributes: Mapping[str, Mapping[str, str]] = MappingProxyType({}),
@@ -219,7 +218,7 @@ def of_arrays(
         columns += made
         fields += [pa.field(part, made[0].type, metadata=said.get(name)) for part in parts]
     table = pa.Table.from_arrays(columns, schema=pa.schema(fields, metadata=texts or None))
-    return of_arrow(path, kind, table, others=tuple(others))
+    return of_arrow(kind, table, others=tuple(others))
 
 
 def _column(values: NDArray[Any]) -> pa.Array:
@@ -245,13 +244,13 @@ def text_of(value: Any) -> str:
     return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
 
 
-def of_arrow(path: str, kind: str, table: pa.Table, **more: Any) -> TableFile:
+def of_arrow(kind: str, table: pa.Table, **more: Any) -> TableFile:
     """A table in memory, with `more` of what a `TableFile` has."""
 
     def batches(names: Sequence[str]) -> Iterator[pa.RecordBatch]:
         yield from table.select(list(names)).to_batches(BATCH_ROWS)
 
-    return TableFile(path, kind, table.schema, table.num_rows, batches, **more)
+    return TableFile(kind, table.schema, table.num_rows, batches, **more)
 
 
 def is_json_lines(head: bytes) -> bool:
@@ -292,7 +291,7 @@ def open_json_lines(path: Path) -> TableFile:
             f"lists and objects within one another, more than {LIMITS.json_depth} deep; "
             "expected a sample of an arm in every line"
         )
-    with as_log_error(path, "JSON lines"):
+    with as_log_error("JSON lines"):
         try:
             frame = pl.read_ndjson(io.BytesIO(text), infer_schema_length=None)
         except pl.exceptions.PolarsError as error:
@@ -304,4 +303,4 @@ def open_json_lines(path: Path) -> TableFile:
             ) from error
         # whole numbers that Arrow has not
         frame = frame.with_columns(pl.col(pl.Int128).cast(pl.Float64))
-        return of_arrow(str(path), "jsonl", frame.to_arrow(), notices=notices)
+        return of_arrow("jsonl", frame.to_arrow(), notices=notices)

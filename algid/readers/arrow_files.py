@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from algid.log import CANONICAL_COLUMNS, KEY, Companion, loads
 from algid.notices import Notice
 from algid.readers.table import as_log_error
-from algid.readers.table_cells import BATCH_ROWS, TableFile, attributed
+from algid.readers.table_cells import BATCH_ROWS, TableFile
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -25,15 +25,14 @@ def open_parquet(path: Path) -> TableFile:
     """
     import pyarrow.parquet as pq
 
-    with as_log_error(path, "Parquet"):
+    with as_log_error("Parquet"):
         about = pq.read_metadata(path)
         schema = about.schema.to_arrow_schema()
         names = set(schema.names)  # damaged ones are no text
         # Arrow's schema lacks what its writer, or another one, states beside it
         schema = schema.with_metadata({**(about.metadata or {}), **(schema.metadata or {})})
-        schema = attributed(schema)
         text = schema.metadata.get(KEY.encode())
-    with as_log_error(path, "truth in the Parquet"):
+    with as_log_error("truth in the Parquet"):
         companion = Companion(None, {}) if text is None else loads(text)
     notices: tuple[Notice, ...] = ()
     if not companion.sums and {"stamp_ns", *CANONICAL_COLUMNS} <= names:
@@ -41,12 +40,12 @@ def open_parquet(path: Path) -> TableFile:
 
     def batches(columns: Sequence[str]) -> Iterator[pa.RecordBatch]:
         with (
-            as_log_error(path, "Parquet"),
+            as_log_error("Parquet"),
             pq.ParquetFile(path, page_checksum_verification=True, pre_buffer=False) as file,
         ):
             yield from file.iter_batches(BATCH_ROWS, columns=list(columns), use_threads=False)
 
-    return TableFile(str(path), "parquet", schema, about.num_rows, batches, companion, notices)
+    return TableFile("parquet", schema, about.num_rows, batches, companion, notices)
 
 
 def open_feather(path: Path) -> TableFile:
@@ -60,7 +59,7 @@ def open_feather(path: Path) -> TableFile:
     import pyarrow as pa
 
     def batches(columns: Sequence[str]) -> Iterator[pa.RecordBatch]:
-        with as_log_error(path, "Feather"), pa.memory_map(str(path)) as source:
+        with as_log_error("Feather"), pa.memory_map(str(path)) as source:
             places = [names.index(name) for name in columns]
             options = pa.ipc.IpcReadOptions(included_fields=places)
             reader = pa.ipc.open_file(source, options=options)
@@ -70,11 +69,11 @@ def open_feather(path: Path) -> TableFile:
                 for first in range(0, batch.num_rows, BATCH_ROWS):
                     yield batch.slice(first, BATCH_ROWS)
 
-    with as_log_error(path, "Feather"), pa.memory_map(str(path)) as source:
-        schema = attributed(pa.ipc.open_file(source).schema)
+    with as_log_error("Feather"), pa.memory_map(str(path)) as source:
+        schema = pa.ipc.open_file(source).schema
         names = list(schema.names)  # damaged ones are no text
         # one column tells the rows; the others need not be unpacked for it
         options = pa.ipc.IpcReadOptions(included_fields=[0])
         reader = pa.ipc.open_file(source, options=options)
         rows = sum(reader.get_batch(place).num_rows for place in range(reader.num_record_batches))
-    return TableFile(str(path), "feather", schema, rows, batches)
+    return TableFile("feather", schema, rows, batches)

@@ -49,7 +49,7 @@ def open_messages(path: Path, kind: str) -> MessageLog:
     files = []
     for one, own in zip(paths, kinds, strict=True):
         files.append(cache(partial(readers.get(own, database_file), one)))
-    return MessageLog(str(path), "mcap" if kinds[0] == "mcap" else "bag", files, notices)
+    return MessageLog("mcap" if kinds[0] == "mcap" else "bag", files, notices)
 
 
 def _files_of_folder(folder: Path) -> tuple[list[Path], tuple[Notice, ...]]:
@@ -107,11 +107,11 @@ def ros1_file(path: Path) -> MessageFile:
     from rosbags.typesys.msg import denormalize_msgtype
 
     reader, mend = Reader(path), f"rosbag reindex {path.name} may mend it, else copy it again"
-    with as_log_error(path, "bag", mend):
+    with as_log_error("bag", mend):
         reader.open()
         if not all(chunk.connection_counts for chunk in reader.chunk_infos):
             reader.close()
-            raise LogError(f"{path}: the bag's index has a chunk without messages; {mend}")
+            raise LogError(f"the bag's index has a chunk without messages; {mend}")
     channels, counts = {}, Counter[int]()
     for one in reader.connections:
         definition = one.msgdef.data.encode()
@@ -140,11 +140,11 @@ def database_file(path: Path) -> MessageFile:
     LogError
         If it is damaged, or holds no tables as rosbag2 writes them.
     """
-    with as_log_error(path, "SQLite"), _connected(path) as base:
+    with as_log_error("SQLite"), _connected(path) as base:
         query = "SELECT name FROM sqlite_master WHERE type = 'table'"  # a view may run for ever
         tables = {str(name) for (name,) in base.execute(query)}
         for needed in sorted({"messages", "topics"} - tables):
-            raise LogError(f"{path}: no table {needed!r}; expected a SQLite file of rosbag2")
+            raise LogError(f"no table {needed!r}; expected a SQLite file of rosbag2")
         own: dict[str, tuple[str, bytes]] = {}
         if "message_definitions" in tables:  # newer rosbag2
             query = (

@@ -50,7 +50,7 @@ def open_csv(path: Path, kind: str, names: Sequence[str] | None = None) -> Table
     dialect = detect(head, names)
     beside, companion = sidecar(path), Companion(None, {})
     if beside.is_file():
-        with as_log_error(beside, "truth", "remove it"):
+        with as_log_error(beside.name, "remove it"):
             companion = loads(read_whole(beside))
     # rows to expect of plain text: from the length of its first lines, and a tenth more
     expected, whole = 0, False
@@ -71,7 +71,6 @@ def open_csv(path: Path, kind: str, names: Sequence[str] | None = None) -> Table
         rows = (line.split(mark) for line in source.split(b"\n"))
         source = b"\n".join((mark or b"\t").join(map(bytes.strip, cells)) for cells in rows)
     return TableFile(
-        str(path),
         "csv",
         dialect.schema,
         0,

@@ -23,7 +23,7 @@ from algid.base.quantiles import median
 from algid.base.units import ANGLE, NANOSECONDS, unit_of
 from algid.log import SLOWEST, IntArray, Origin, Reading, add, word_sum
 from algid.notices import Notice, Remedy
-from algid.readers.annotations import lines_of, settings_unused, stated_rate, unused
+from algid.readers.annotations import lines_of, object_in, settings_unused, stated_rate, unused
 from algid.readers.column_names import (
     COMMANDED,
     CURRENTS,
@@ -51,7 +51,6 @@ from algid.readers.table_cells import (
     TableFile,
     cell_batches,
     cells_of,
-    decoded,
     groups_in,
     units_of,
 )
@@ -73,7 +72,12 @@ def offer_table(table: TableFile, profile: Profile) -> Offered:
     LogError
         If a column is missing, or stands there for more joints than two.
     """
-    path, cells = table.path, cells_of(table)
+    cells = cells_of(table)
+    metadata = {
+        key: text
+        for key, text in table.metadata.items()
+        if not (key in table.schema.names and object_in(text))  # of the column alone
+    }
     gone = [name for name in table.companion.sums if name not in cells]
     if gone:
         raise LogError(
@@ -87,7 +91,6 @@ def offer_table(table: TableFile, profile: Profile) -> Offered:
         by_user["t"] = INDEX
     named = {name: column for name, column in by_user.items() if column}
     offered = Offered(
-        path,
         table.kind,
         cells,
         named,
@@ -96,7 +99,7 @@ def offer_table(table: TableFile, profile: Profile) -> Offered:
         rows=table.rows or table.expected,
         units=units_of(table, cells),
         notices=(*table.notices, *groups_in(table)),
-        said=(*table.said, *lines_of(decoded(table.schema.metadata))),
+        said=(*table.said, *lines_of(metadata)),
         others=table.others,
     )
     for name, column in named.items():
@@ -113,7 +116,7 @@ def offer_table(table: TableFile, profile: Profile) -> Offered:
     return replace(offered, chosen=choice.columns | named, joints=choice.joints)
 
 
-def open_offered(offered: Offered, profile: Profile) -> TableReader:
+def open_offered(path: str, offered: Offered, profile: Profile) -> TableReader:
     """A reader of what a log offers, as a profile, or the log itself, says what it means.
 
     Raises
@@ -122,7 +125,7 @@ def open_offered(offered: Offered, profile: Profile) -> TableReader:
         If a channel has no source or that holds no numbers, a torque is in amperes without a torque
         constant, or an angle in counts without counts a turn.
     """
-    path, fields = offered.path, offered.fields
+    fields = offered.fields
     sources = _sources(offered, profile)
     for name, source in sources.items():
         one = fields[source]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
@@ -146,16 +147,12 @@ def moving_joints(
     Where they move, the two-link model lacks their torque. `positions` has by joint the name of
     its angle, in `unit` rad; `tables` reads such fields by channel.
     """
-    if not positions:
-        return ()
-    places = {place: place for place in positions.values()}
-    try:
-        table = next((one for one in tables(places) if len(one)), None)
-    except LogError:  # the joints that are read tell of what is wrong
-        return ()
+    table, moved = None, dict[str, float]()
+    with suppress(LogError):  # the joints that are read tell of what is wrong
+        looked = tables({place: place for place in positions.values()}) if positions else iter(())
+        table = next(filter(len, looked), None)
     if table is None:
         return ()
-    moved: dict[str, float] = {}
     for joint, place in positions.items():
         values = table.columns[place][:LOOKED]
         finite = values[np.isfinite(values)]

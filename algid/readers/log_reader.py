@@ -71,8 +71,7 @@ class TableReader:
         LogError
             As `blocks`.
         """
-        with during("reading", self.origin.path):
-            (log,) = self._gathered(sys.maxsize)
+        (log,) = self.blocks(sys.maxsize)
         return log
 
     def _gathered(self, most: int) -> Iterator[Log]:
@@ -180,15 +179,15 @@ class TableReader:
     def _of_passive(self, begin: SampleTable) -> tuple[Notice, ...]:
         """What to say of a torque in the column of a joint that is called passive."""
         passive, mapping = self.origin.reading.passive, self.origin.mapping
-        names = f"tau{passive}", f"tau{3 - (passive or 1)}"
-        if not set(names) <= begin.columns.keys() or mapping[names[0]] == mapping[names[1]]:
+        own, other = f"tau{passive}", f"tau{3 - (passive or 1)}"
+        if own not in begin.columns or mapping[own] == mapping[other]:
             return ()
-        with np.errstate(over="ignore"):  # without a motor a torque may be anything
-            own, other = (np.sqrt(np.mean(np.square(begin.columns[name]))) for name in names)
-        if not (np.isfinite(own) and own > PASSIVE_TORQUE * other > 0):
+        with np.errstate(all="ignore"):  # without a motor a torque may be anything
+            size = np.linalg.norm(begin.columns[own])
+            share = float(size / np.linalg.norm(begin.columns[other]))
+        if not PASSIVE_TORQUE < share < math.inf:
             return ()
-        share = 100 * float(own / other)
-        numbers = {"column": mapping[names[0]], "joint": passive, "percent": share}
+        numbers = {"column": mapping[own], "joint": passive, "percent": 100 * share}
         return (Notice("PASSIVE_TORQUE", numbers=numbers),)
 
 

@@ -148,7 +148,7 @@ def mcap_file(path: Path) -> MessageFile:
             counts.update(part.counts or {})
     truth = None
     if not found.records.keys().isdisjoint(_TRUTH):  # of its name no checksum speaks
-        with as_log_error(path, "truth in the MCAP"):
+        with as_log_error("truth in the MCAP"):
             truth = loads(found.records[_TRUTH[0]].metadata[KEY]).truth
     channels = {}
     for (code, number), one in found.records.items():

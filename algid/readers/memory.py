@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 from algid.base.errors import LogError, SettingError
 from algid.log import Log
 from algid.readers.arrays import of_arrays, of_arrow
-from algid.readers.table_cells import TableFile, attributed
+from algid.readers.table_cells import ATTRS, TableFile
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -162,7 +163,7 @@ def open_columns(given: FrameOrArrays) -> TableFile:
                 raise LogError(
                     f"{NAME}: {name!r} is no array ({error}); give numbers of one shape"
                 ) from error
-        return of_arrays(NAME, "dict", arrays)
+        return of_arrays("dict", arrays)
     import pyarrow as pa
 
     try:
@@ -174,5 +175,7 @@ def open_columns(given: FrameOrArrays) -> TableFile:
         ) from error
     attributes = getattr(given, "attrs", None)  # of pandas
     if isinstance(attributes, Mapping) and attributes:
-        table = table.cast(attributed(table.schema, attributes))
-    return of_arrow(NAME, "frame", table)
+        said = {str(key): value for key, value in attributes.items()}
+        known = table.schema.metadata or {}
+        table = table.replace_schema_metadata({**known, ATTRS: json.dumps(said, default=str)})
+    return of_arrow("frame", table)

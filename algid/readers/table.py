@@ -30,8 +30,8 @@ CHANNELS = JOINT_CHANNELS + VELOCITIES + REFERENCES
 
 
 @contextmanager
-def as_log_error(path: object, kind: str, mend: str = "copy it again") -> Iterator[None]:
-    """Turn what a library raises about a file into a `LogError` that says how to `mend` it.
+def as_log_error(kind: str, mend: str = "copy it again") -> Iterator[None]:
+    """Turn what a library raises about a file of some `kind` into a `LogError`.
 
     A `LogError` passes. A panic of polars is no Exception.
 
@@ -49,7 +49,7 @@ def as_log_error(path: object, kind: str, mend: str = "copy it again") -> Iterat
             raise
         reason = str(error).partition("\n")[0][:200]
         raise LogError(
-            f"{path}: the {kind} file is damaged or not one that can be read "
+            f"the {kind} file is damaged or not one that can be read "
             f"({type(error).__name__}: {reason}); {mend}"
         ) from error
 
@@ -137,8 +137,8 @@ class Offered:
 
     Attributes
     ----------
-    path, kind : str
-        What messages call it, and its format.
+    kind : str
+        Its format.
     fields : mapping
         Its numbers and times by name.
     chosen : mapping
@@ -163,7 +163,6 @@ class Offered:
         What else it holds, of another length.
     """
 
-    path: str
     kind: str
     fields: Mapping[str, Cell | TopicField]
     chosen: Mapping[str, str]

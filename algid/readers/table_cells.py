@@ -12,6 +12,7 @@ import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from algid.base.errors import LogError
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     import polars as pl
     import pyarrow as pa
 
+ATTRS = "PANDAS_ATTRS"
+"""The key of metadata under which pandas saves the attributes of a frame."""
 BATCH_ROWS = 1 << 14
 """Rows that are decoded at once: few enough to stay in a core's cache."""
 LABELS = ("name", "names", "joint_name", "joint_names")
@@ -44,8 +47,8 @@ class TableFile:
 
     Attributes
     ----------
-    path, kind : str
-        What messages call it, and its format.
+    kind : str
+        Its format.
     schema : pyarrow.Schema
         Names and types of the columns; what the file states of them is in the metadata.
     rows : int
@@ -65,7 +68,6 @@ class TableFile:
         What it states in words, such as comments.
     """
 
-    path: str
     kind: str
     schema: pa.Schema
     rows: int
@@ -75,6 +77,19 @@ class TableFile:
     others: tuple[str, ...] = ()
     expected: int = 0
     said: tuple[str, ...] = ()
+
+    @cached_property
+    def metadata(self) -> dict[str, str]:
+        """What it states of itself as text, the attributes of a pandas frame too.
+
+        Those by a column's name are the column's.
+        """
+        metadata = decoded(self.schema.metadata)
+        saved: Any = object_in(metadata.pop(ATTRS, ""))  # by pandas itself, or by Arrow
+        saved = saved or object_in(metadata.get("pandas", "")).get("attributes")
+        for key, value in saved.items() if isinstance(saved, dict) else ():
+            metadata[key] = json.dumps(value) if isinstance(value, dict) else str(value)
+        return metadata
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,22 +192,23 @@ def cells_of(table: TableFile) -> dict[str, Cell]:
     if nested:
         import polars as pl
 
-        with as_log_error(table.path, table.kind):
+        with as_log_error(table.kind):
             frame = pl.DataFrame(next(table.batches(nested), None))
-    metadata = decoded(table.schema.metadata)
+    metadata = table.metadata
     label, joints = _spoken(table)
     cells: dict[str, Cell] = {}
     for one in table.schema:
-        own = decoded(one.metadata)
+        beside = object_in(metadata.get(one.name, ""))
+        own = decoded(one.metadata) | {key: str(value) for key, value in beside.items()}
         said = {key.lower(): value for key, value in metadata.items() if key.lower() in _FILLS}
         said |= {key.lower(): value for key, value in own.items()}
         if one.name == label:
             continue
         if joints and is_list(one.type) and _is_quantity(one.name):
             for joint in joints[: LIMITS.joints]:
-                beside = _lists(_whole(label), table.schema.field(label).type)
-                own = beside.eval(pl.element() == joint).list
-                at = pl.when(own.any()).then(own.arg_max())
+                called = _lists(_whole(label), table.schema.field(label).type)
+                mine = called.eval(pl.element() == joint).list
+                at = pl.when(mine.any()).then(mine.arg_max())
                 number = _lists(_whole(one.name), one.type).get(at, null_on_oob=True)
                 cell = Cell((one.name, label), one.type.value_type, number, joint)
                 cells[f"/{label}/{joint}/{one.name}"] = _marked(cell, said)
@@ -310,7 +326,7 @@ def units_of(table: TableFile, cells: Mapping[str, Cell]) -> dict[str, str]:
 
     A column of texts such as ``torque_unit`` states one too, in its first row.
     """
-    metadata = decoded(table.schema.metadata)
+    metadata = dict(table.metadata)
     for one in table.schema:
         if one.name.lower().endswith(("_unit", "_units")) and is_text(one.type):
             metadata[one.name] = next(_values(table, one.name), "")
@@ -339,31 +355,6 @@ def decoded(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
     for key, value in (metadata or {}).items():
         texts[key.decode(errors="replace")] = value.decode(errors="replace")
     return texts
-
-
-def attributed(schema: pa.Schema, attributes: Mapping[str, Any] | None = None) -> pa.Schema:
-    """A schema with the attributes of a pandas frame, or those that pandas saved with it.
-
-    Those by a column's name are the column's, others the table's.
-    """
-    import pyarrow as pa
-
-    metadata = decoded(schema.metadata)
-    if attributes is None:
-        saved = object_in(metadata.pop("PANDAS_ATTRS", ""))  # by pandas itself, or by Arrow
-        attributes = saved or object_in(metadata.get("pandas", "")).get("attributes")
-        if not isinstance(attributes, Mapping):
-            return schema
-    fields = []
-    for one in schema:
-        own = attributes.get(one.name)
-        said = {str(k): str(v) for k, v in own.items()} if isinstance(own, Mapping) else {}
-        fields.append(one.with_metadata(decoded(one.metadata) | said))
-    for key, value in attributes.items():
-        if key not in schema.names:
-            text = json.dumps(value, default=str) if isinstance(value, Mapping) else str(value)
-            metadata[str(key)] = text
-    return pa.schema(fields, metadata=metadata)
 
 
 def is_text(kind: pa.DataType) -> bool:

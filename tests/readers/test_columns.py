@@ -77,7 +77,7 @@ def test_two_of_numbered_joints_are_called_by_number_word_or_column(forms: str, 
 
 
 def test_columns_that_were_written_must_be_there() -> None:
-    table = of_arrays("log.csv", "arrays", {name: np.arange(3.0) for name in PLAIN.split()[:-1]})
+    table = of_arrays("arrays", {name: np.arange(3.0) for name in PLAIN.split()[:-1]})
     sums = dict.fromkeys(("tau2", "tau1", "omega1"), 0)
     with pytest.raises(
         LogError, match="the columns tau2, omega1 that were written are not there: the file was"

@@ -44,7 +44,6 @@ def reader(
     fields = {name: TopicField(name) for name in MAPPING.values()}
     fields["t"] = TopicField("t", is_clock=True)
     offered = Offered(
-        "log.csv",
         "csv",
         fields,
         MAPPING | {"t": "t"},
@@ -52,7 +51,7 @@ def reader(
         None,
         notices=(Notice("FIRST", "first"),),
     )
-    return open_offered(offered, profile)
+    return open_offered("log.csv", offered, profile)
 
 
 def codes(log: Log) -> list[str]:

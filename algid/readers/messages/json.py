@@ -13,7 +13,7 @@ from typing import Any
 from algid.base.limits import LIMITS
 from algid.base.text import repeated
 from algid.readers.annotations import BAD, GOOD, GROUPS
-from algid.readers.messages.layout import MessageLayout, MisfitError, Numbers
+from algid.readers.messages.layout import MessageLayout, MisfitError
 from algid.readers.messages.message_file import Messages
 
 
@@ -78,7 +78,7 @@ class JsonRecords:
         if structure not in self._known:
             layout = MessageLayout(fixed=[(0, 8)])
             for place, path in enumerate(numbers, start=1):
-                layout.numbers[path] = Numbers(8 * place, "<f8")
+                layout.add(path, 8 * place, "<f8")
             for path, leaf in leaves.items():
                 if type(leaf) is tuple:
                     layout.texts[path] = leaf

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,8 @@ from algid.base.text import counted
 from algid.readers.annotations import BAD, GOOD, GROUPS
 from algid.readers.messages.message_file import Messages, gather
 
-_BRACKET = re.compile(r"(\[[^\]]*\])")
-_ELEMENT = re.compile(r"(.*)\[(\d{1,9})\]")
+_PLACE = r"([^.\[\]]+)\[(\d{1,9})\](.*)"
+"""A list of a structure, the place of one of its numbers, and where that number lies there."""
 
 
 class MisfitError(Exception):
@@ -30,8 +31,8 @@ class MisfitError(Exception):
 
 
 @dataclass(frozen=True)
-class Numbers:
-    """`count` numbers side by side at byte `offset`: a NumPy type, or a varint in `width` bytes.
+class Number:
+    """A number at byte `offset`: a NumPy type, or a varint in `width` bytes.
 
     That is "varint" in two's complement, "unsigned", or "zigzag" with the sign in its lowest bit.
     "zero" stands nowhere.
@@ -39,19 +40,21 @@ class Numbers:
 
     offset: int
     kind: str
-    count: int = 1
-    width: int = 0
+    width: int
 
 
 @dataclass
 class MessageLayout:
     """What a parse of one message found. Ranges in `fixed` are [start, end)."""
 
-    numbers: dict[str, Numbers] = field(default_factory=dict)
+    numbers: dict[str, Number] = field(default_factory=dict)
+    """By path: ``wrench.torque.z``, ``data[1]``."""
     texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
     fixed: list[tuple[int, int]] = field(default_factory=list)
     labels: dict[str, str] = field(default_factory=dict)
-    """Single texts: all of a JSON message, elsewhere those that name an arm or a recording."""
+    """Single texts that name an arm or a recording, of a JSON message a unit, too."""
+    empty: list[str] = field(default_factory=list)
+    """Lists of no numbers."""
     flags: list[int] = field(default_factory=list)
     """Bytes of which only the highest bit is fixed: those of a varint."""
 
@@ -61,50 +64,51 @@ class MessageLayout:
             start = self.fixed.pop()[0]
         self.fixed.append((start, end))
 
-    def find(self, path: str) -> Numbers | None:
-        """The number at a path (``wrench.torque.z``, ``data[1]``, ``position[elbow]``), or None.
+    def add(self, path: str, offset: int, kind: str, count: int | None = None) -> None:
+        """Note a number at byte `offset`, or `count` side by side."""
+        width = int(kind[-1])
+        if count is None:
+            self.numbers[path] = Number(offset, kind, width)
+            return
+        self.empty += [] if count else [path]
+        for place in range(min(count, LIMITS.columns)):
+            self.numbers[f"{path}[{place}]"] = Number(offset + place * width, kind, width)
 
-        A name in brackets stands for its place in a list of strings beside the indexed one.
+    @cached_property
+    def named(self) -> dict[str, str]:
+        """By path in which names stand for places (``position[elbow]``) that of the number.
+
+        The names are those of a list of texts beside the list.
         """
-        place = ""
-        for part in _BRACKET.split(path):
-            index = part
-            if part.startswith("["):  # a name first: joints may be called "1" and "2"
-                for at, texts in self.texts.items():
-                    if at.rpartition(".")[0] == place.rpartition(".")[0] and part[1:-1] in texts:
-                        if texts.count(part[1:-1]) > 1:
-                            return None
-                        index = f"[{texts.index(part[1:-1])}]"
-                        break
-            place += index
-        if found := self.numbers.get(place):
-            return found if found.count == 1 else None
-        element = _ELEMENT.fullmatch(place)
-        numbers = self.numbers.get(element[1]) if element else None
-        if element is None or numbers is None or numbers.kind[0] not in "<>|":
-            return None
-        number = int(element[2])
-        found = Numbers(numbers.offset + number * int(numbers.kind[-1]), numbers.kind)
-        return found if number < numbers.count else None
+        named = dict[str, str]()
+        # what lies within a list has names of its own first: interface_values[elbow].values[effort]
+        for at, texts in sorted(self.texts.items(), key=lambda one: -one[0].count(".")):
+            beside = re.compile(re.escape(at[: at.rfind(".") + 1]) + _PLACE)
+            for path, place in [*zip(self.numbers, self.numbers, strict=True), *named.items()]:
+                match = beside.fullmatch(path)
+                name = texts[int(match[2])] if match and int(match[2]) < len(texts) else None
+                if match and texts.count(name) == 1:
+                    named[f"{path[: match.start(2)]}{name}{path[match.end(2) :]}"] = place
+        return named
 
-    def has(self, paths: Iterable[str]) -> bool:
-        """True if the message has the numbers at all of the paths."""
-        return all(self.find(path) is not None for path in paths)
+    def find(self, path: str) -> Number | None:
+        """The number at a path, or None; a joint may be called "1", and is meant then."""
+        return self.numbers.get(self.named.get(path, path))
 
-    def missing(self, wanted: Mapping[str, str]) -> list[str]:
-        """Paths of the `wanted` numbers that the message lacks; none where it is of other joints.
+    def missing(self, wanted: Iterable[str]) -> list[str]:
+        """Those of the `wanted` paths that the message lacks; none where it is of other joints.
 
         It is if it names joints, and none of those of the paths such as ``effort[elbow]``, or if it
         is empty.
         """
-        indexed = [path.partition("]")[0].partition("[") for path in wanted.values()]
+        indexed = [path.partition("]")[0].partition("[") for path in wanted]
         joints = {name for _, _, name in indexed if name and not name.isdigit()}
         lists = {place for place, bracket, _ in indexed if bracket}
         named = set().union(*self.texts.values())
-        held = (path.partition("[")[0] for path, one in self.numbers.items() if one.count)
+        held = (path.partition("[")[0] for path in self.numbers)
         if joints and joints.isdisjoint(named) and (named or lists.isdisjoint(held)):
             return []
-        return [path for path in wanted.values() if self.find(path) is None]
+        return [path for path in wanted if self.find(path) is None]
 
 
 @dataclass(frozen=True)
@@ -132,7 +136,7 @@ class _Pattern:
     words: NDArray[np.intp]
     masks: NDArray[np.uint64]
     values: NDArray[np.uint64]
-    places: Mapping[str, Numbers] | None
+    places: Mapping[str, Number] | None
     left_out: Mapping[str, str]
 
     def matches(self, table: NDArray[np.uint64], rows: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -184,6 +188,8 @@ class Decoder:
     left_out : mapping
         Messages left out so far, as their notice tells: by case ("fields" that they lack, of other
         "joints", not of their "schema") their count, and what the first one lacks.
+    layouts : list of MessageLayout
+        The first ones found, each unlike those before of its size.
     labels : mapping
         By path what a text names that says whose a message is.
     """
@@ -191,6 +197,7 @@ class Decoder:
     wanted: Mapping[str, str]
     codec: Codec
     left_out: dict[str, dict[str, Any]] = field(default_factory=dict)
+    layouts: list[MessageLayout] = field(default_factory=list)
     labels: dict[str, set[str]] = field(default_factory=dict)
     _known: dict[int, list[_Pattern]] = field(default_factory=dict)
 
@@ -257,6 +264,7 @@ class Decoder:
         except MisfitError as error:
             self.leave("schema", 1, first=str(error))
             return None
+        self.layouts += [layout] if len(self.layouts) < LIMITS.layouts else []
         for path, text in layout.labels.items():
             known = self.labels.setdefault(path, set())
             if path.rpartition(".")[2] in GROUPS and len(known) < LIMITS.joints:
@@ -268,8 +276,7 @@ class Decoder:
         lacks = list[str]()  # by what a message says itself that it is no measurement
         for name in sorted(GOOD | BAD):  # another value of a flag is another pattern
             if (flag := layout.find(name)) is not None:
-                width = 0 if flag.kind == "zero" else flag.width or int(flag.kind[-1])
-                own = slice(lead + flag.offset, lead + flag.offset + width)
+                own = slice(lead + flag.offset, lead + flag.offset + flag.width)
                 mask[own] = 0xFF
                 lacks += [name] * ((name in GOOD) != any(row[own]))
         masks = mask.view(np.uint64)
@@ -279,6 +286,6 @@ class Decoder:
         why = {"case": "joints"}
         found = {name: at for name, at in places.items() if at is not None}
         whole = len(found) == len(places) and not lacks
-        if lacks := lacks or layout.missing(self.wanted):
+        if lacks := lacks or layout.missing(self.wanted.values()):
             why = {"case": "fields", "fields": ", ".join(lacks)}
         return _Pattern(words, masks[words], values, found if whole else None, why)

@@ -130,7 +130,7 @@ class MessageFile:
         if self.damage:
             where = "; ".join(list(dict.fromkeys(self.damage))[:3])
             what = f"the file is damaged ({where}); copy it again; in what is left: {what}"
-        return f"{self.path}: {what}"
+        return what
 
     def listed(self) -> str:
         """The topics with their types, for a message."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from algid.profile import Profile
 from algid.readers.annotations import in_json_schema, lines_of, units_in
 from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.column_names import STEMS, ChannelChoice, choose
-from algid.readers.messages.layout import MessageLayout, MisfitError
+from algid.readers.messages.layout import Decoder, MessageLayout
 from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import codec_for, topic_tables
 from algid.readers.table import (
@@ -31,8 +32,9 @@ from algid.readers.table_cells import LABELS
 _SAMPLES = 64
 TOPIC = Remedy({"topic": None})
 _USUAL = "/joint_states"
-_INTERFACES = "interface_values"
-"""What each joint has of a DynamicJointState, beside its name."""
+_STEMS = frozenset(chain.from_iterable(STEMS.values()))
+_BESIDE_NAMES = re.compile(r"(?:interface_values\[([^\]]*)\]\.values|(\w+))\[([^\]]*)\]")
+"""Numbers of a joint, or of one of a DynamicJointState, by its name."""
 _TELLING = (b"effort", b"tau_est", b"tau_J")
 """Names of torques in definitions: of ROS, Unitree, libfranka."""
 _JOINT_REFERENCES = "/joint_references"
@@ -45,12 +47,11 @@ _PARTS = (("sec", "nanosec"), ("sec", "nsec"), ("seconds", "nanos"), ("secs", "n
 
 @dataclass(frozen=True)
 class MessageLog:
-    """A log of messages: what messages call it, its format, and what opens its files in order.
+    """A log of messages: its format, and what opens its files in order.
 
     Several passes go over a log: an opened file is kept.
     """
 
-    path: str
     kind: str
     files: Sequence[Callable[[], MessageFile]]
     notices: tuple[Notice, ...] = ()
@@ -84,7 +85,7 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
         named |= _references_of(file, own)
     for name, (topic, path) in given.items():
         if not (topic or home):
-            raise LogError(f"{file.path}: {name} is taken from {path!r} without a topic: {TOPIC}")
+            raise LogError(f"{name} is taken from {path!r} without a topic: {TOPIC}")
         named[name] = TopicField(str(path), topic or home or "")
     for name, one in named.items():
         chosen[name] = f"{one.topic}/{one.column}/"  # a name in which nothing is a unit
@@ -109,7 +110,7 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
             stamps[home] = next(filter(None, map(stamp_in, layouts)), None)
         if profile.clock == "header" and stamps[home] is None:
             log_clock = Remedy({"clock": "log"})
-            raise LogError(f"{file.path}: messages on {home!r} carry no stamp: {log_clock}")
+            raise LogError(f"messages on {home!r} carry no stamp: {log_clock}")
         stated, lines = _stated_of(file, home, paths, layouts)
         units |= stated
         said += lines
@@ -154,14 +155,12 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
             except LogError as error:
                 if not only_followed:
                     raise
-                why = str(error).removeprefix(f"{log.path}: ")
-                numbers = {"case": "reference", "topic": one, "why": why}
+                numbers = {"case": "reference", "topic": one, "why": str(error)}
                 told.append(Notice("MESSAGES_LEFT_OUT", numbers=numbers))
         return aligned(in_order(samples, told), needed, told, followed)
 
     clock = "header" if stamp else "log"
     return Offered(
-        log.path,
         log.kind,
         fields,
         chosen,
@@ -209,7 +208,7 @@ def _references_of(file: MessageFile, joints: Sequence[str]) -> dict[str, TopicF
             names = names_in(layout)
             for positions in _REFERENCES:
                 paths = [f"{positions}[{names.index(one)}]" for one in joints if one in names]
-                if len(paths) == len(joints) and layout.has(paths):
+                if len(paths) == len(joints) and all(map(layout.find, paths)):
                     found.append([TopicField(path, topic) for path in paths])
                     break
     return dict(zip(REFERENCES, found[0], strict=True)) if len(found) == 1 else {}
@@ -246,13 +245,13 @@ def _find_joint_topic(
                     fields = fields_in(name, layout)
                     choice = _choice(fields, profile, given)
                 except LookupError as error:
-                    why = f"{file.path}: {name!r}: {error}; {choose_two}; {by_place} …"
+                    why = f"{name!r}: {error}; {choose_two}; {by_place} …"
                     continue
                 if choice.columns.keys() >= set(needed):
                     fitting[name] = fields, choice
                     break
-                if names := names_in(layout):
-                    held = f"{name!r} with {', '.join(list(_paths(layout, names))[:12])}"
+                if names_in(layout):
+                    held = f"{name!r} with {', '.join([*_paths(layout)][:12])}"
         except LogError as error:  # another topic may still hold the joints
             refused.append(str(error))
         if name not in fitting:
@@ -262,7 +261,7 @@ def _find_joint_topic(
         topic = _USUAL if _USUAL in fitting else next(iter(fitting))
         return topic, *fitting.pop(topic), list(fitting)
     if fitting:
-        raise LogError(f"{file.path}: joint states on {', '.join(fitting)}; choose: {TOPIC}")
+        raise LogError(f"joint states on {', '.join(fitting)}; choose: {TOPIC}")
     for refusal in refused:
         raise LogError(refusal)
     if all(profile.channel(name).source for name in profile.needed):
@@ -297,21 +296,15 @@ def fields_in(topic: str, layout: MessageLayout) -> dict[str, TopicField]:
     names, fields = names_in(layout), dict[str, TopicField]()
     if twice := repeated(names):
         raise LookupError(f"its messages name the joint {twice[0]!r} twice")
-    paths = list(_paths(layout, ()))
-    lists = {path.partition("[")[0] for path in paths}
-    known = [stem for stem in chain.from_iterable(STEMS.values()) if stem in lists]
-    beside = [(stem, f"{stem}[{{}}]") for stem in known]
-    if _INTERFACES in lists:
-        words = ("position", "velocity", "effort")
-        beside += [(word, f"{_INTERFACES}[{{}}].values[{word}]") for word in words]
-    for joint in names:
-        for stem, form in beside:
-            if layout.find(path := form.format(joint)):
+    called = {place: path for path, place in layout.named.items()}
+    for place in layout.numbers:
+        path = called.get(place, place)
+        fields[place] = TopicField(place, topic)
+        if match := _BESIDE_NAMES.fullmatch(path):
+            joint, stem = (match[1], match[3]) if match[1] else (match[3], match[2])
+            if joint in names and stem in _STEMS:
+                del fields[place]
                 fields[f"{topic}/{joint}/{stem}"] = TopicField(path, topic, joint)
-    used = {field.column.partition("[")[0] for field in fields.values()}
-    for path in paths:
-        if path.partition("[")[0] not in used and layout.find(path):
-            fields[path] = TopicField(path, topic)
     return fields
 
 
@@ -328,7 +321,7 @@ def stamp_in(layout: MessageLayout) -> tuple[str, str] | None:
     for base in _STAMPS:
         for seconds, nanoseconds in _PARTS:
             pair = (f"{base}.{seconds}", f"{base}.{nanoseconds}")
-            if layout.has(pair):
+            if all(map(layout.find, pair)):
                 return pair
     return None
 
@@ -336,21 +329,16 @@ def stamp_in(layout: MessageLayout) -> tuple[str, str] | None:
 def fields_shown(file: MessageFile, number: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Joints in a channel's first message, and its numbers' paths as a profile writes them."""
     layout = _first_layout(file, file.channels[number].topic)
-    joints = names_in(layout)
-    return joints, tuple(_paths(layout, joints))
+    return names_in(layout), tuple(_paths(layout))
 
 
-def _paths(layout: MessageLayout, joints: Sequence[str]) -> Iterator[str]:
-    """The paths of a message's numbers: of a field one, none, or one a place."""
-    for name, numbers in layout.numbers.items():
-        if numbers.count == 1:
-            yield name
-            continue
-        if not numbers.count:
-            yield f"{name} (empty)"
-        places = range(min(numbers.count, LIMITS.list_cells))
-        for place in joints if numbers.count == len(joints) else places:
-            yield f"{name}[{place}]"
+def _paths(layout: MessageLayout) -> Iterator[str]:
+    """The paths of a message's numbers, and its empty lists."""
+    called = {place: path for path, place in layout.named.items()}
+    for place in layout.numbers:
+        yield called.get(place, place)
+    for path in layout.empty:
+        yield f"{path} (empty)"
 
 
 def _first_layout(file: MessageFile, topic: str) -> MessageLayout:
@@ -361,35 +349,25 @@ def _first_layout(file: MessageFile, topic: str) -> MessageLayout:
 
 
 def layouts_of(file: MessageFile, topic: str) -> list[MessageLayout]:
-    """Layouts of the topic's first messages that fit their schema, each unlike the one before.
+    """Layouts of the topic's first messages that fit their schema.
 
     Raises
     ------
     LogError
         If none of them does.
     """
-    layouts = list[MessageLayout]()
     if topic not in file.topics:
-        return layouts
-    codec, misfit = codec_for(file.path, file.channel(topic)), None
+        return []
+    decoder = Decoder({}, codec_for(file.channel(topic)))
     for messages in file.batches(file.topics[topic]):
         if isinstance(messages, str):
             file.damage.append(messages)
             continue
-        records = codec.records(messages.take(slice(_SAMPLES)))
-        for start, size in zip(records.starts, records.sizes, strict=True):
-            end = start + min(size, LIMITS.message_bytes)
-            try:
-                layout = codec.parse(records.content[start:end].tobytes())
-            except MisfitError as error:
-                misfit = error
-                continue
-            before = layouts[-1] if layouts else None
-            if before is None or (before.numbers, before.texts) != (layout.numbers, layout.texts):
-                layouts.append(layout)
-        if misfit and not layouts:
-            why = f"{misfit}; it cannot be read"
-            raise LogError(f"{file.path}: topic {topic!r}: {why}") from misfit
-        if layouts:
+        for place in range(min(len(messages), _SAMPLES)):
+            decoder.columns(messages.take(slice(place, place + 1)))
+        if decoder.layouts:
             break
-    return layouts
+        if misfits := decoder.left_out.get("schema"):
+            why = f"{misfits['first']}; it cannot be read"
+            raise LogError(f"topic {topic!r}: {why}")
+    return decoder.layouts

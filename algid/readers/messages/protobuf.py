@@ -18,12 +18,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from algid.base.limits import LIMITS
-from algid.readers.messages.layout import MessageLayout, MisfitError, Numbers
+from algid.readers.messages.layout import MessageLayout, MisfitError, Number
 
 _KINDS = {1: "<f8", 2: "<f4", 6: "<u8", 7: "<u4", 15: "<i4", 16: "<i8"}
 _KINDS |= dict.fromkeys((3, 5, 8, 13, 14), "varint") | {4: "unsigned", 17: "zigzag", 18: "zigzag"}
 _STRING, _MESSAGE, _BYTES, _REPEATED = 9, 11, 12, 3
-_ZERO = Numbers(0, "zero")
+_ZERO = Number(0, "zero", 0)
 
 Types = dict[str, tuple[dict[int, Any], list[str]]]
 """By message type its field descriptors by number, and the names of the numbers that it leaves out
@@ -107,7 +107,7 @@ def parse_layout(payload: bytes, root: str, types: Types) -> MessageLayout:
 
 @dataclass
 class _Walk:
-    """A walk over one message; `counts` has by path of a repeated field how many there are."""
+    """A walk over one message; `counts` has how many of a repeated field there are, or -1."""
 
     data: bytes
     types: Types
@@ -133,21 +133,18 @@ class _Walk:
 
     def field(self, own: Any, wire: int, first: int, stop: int, prefix: str) -> None:
         """Take in a field, whose bytes are [first, stop)."""
-        numbers, kind, repeated = (
-            self.layout.numbers,
-            _KINDS.get(own.type, ""),
-            own.label == _REPEATED,
-        )
+        kind, repeated = _KINDS.get(own.type, ""), own.label == _REPEATED
         path = place = prefix + own.name
         width = int(kind[-1]) if kind.startswith("<") else 0
         packed = repeated and wire == 2 and width > 0
         if repeated:
-            if path in numbers or (packed and (self.counts[path] or (stop - first) % width)):
+            before = self.counts[path]
+            if before < 0 or (packed and (before or (stop - first) % width)):
                 raise MisfitError(f"the list {own.name!r} comes in parts or has a broken length")
-            place = path if packed else f"{path}[{self.counts[path]}]"
-            self.counts[path] += 1
+            place = f"{path}[{before}]"
+            self.counts[path] = -1 if packed else before + 1
         if packed:
-            numbers[path] = Numbers(first, kind, (stop - first) // width)
+            self.layout.add(path, first, kind, (stop - first) // width)
         elif wire == 2 and own.type == _MESSAGE:
             self.message(first, stop, own.type_name, f"{place}.")
         elif wire == 2 and own.type == _STRING:
@@ -157,8 +154,8 @@ class _Walk:
                 self.layout.texts[path] = (*self.layout.texts.get(path, ()), text)
         elif wire == 0 and kind and not width:
             self.layout.flags.extend(range(first, stop))
-            numbers[place] = Numbers(first, kind, 1, stop - first)
+            self.layout.numbers[place] = Number(first, kind, stop - first)
         elif wire in (1, 5) and width == stop - first:
-            numbers[place] = Numbers(first, kind)
+            self.layout.add(place, first, kind)
         elif wire != 2 or not (own.type == _BYTES or (repeated and kind and not width)):
             raise MisfitError(f"the field {own.name!r} is not encoded as its type says")

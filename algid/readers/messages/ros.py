@@ -17,7 +17,7 @@ from typing import Any
 from algid.base.limits import LIMITS
 from algid.base.text import counted
 from algid.readers.annotations import GROUPS
-from algid.readers.messages.layout import MessageLayout, MisfitError, Numbers
+from algid.readers.messages.layout import MessageLayout, MisfitError
 
 PRIMITIVES = {
     "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1",
@@ -172,10 +172,8 @@ class _Walk:
                 size = int(code[1])
                 if count != 0:
                     self.align(size)
-                many = 1 if count is None else count
-                kind = f"{self.order if size > 1 else '|'}{code}"
-                self.layout.numbers[path] = Numbers(self.place, kind, many)
-                self.take(many * size)
+                self.layout.add(path, self.place, f"{self.order if size > 1 else '|'}{code}", count)
+                self.take(size if count is None else count * size)
             elif field.type in TEXTS and count is not None:
                 self.layout.texts[path] = tuple(self.text(field.type) for _ in range(count))
             elif field.type in TEXTS and field.name in GROUPS:

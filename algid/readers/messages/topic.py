@@ -22,7 +22,7 @@ from algid.readers.table import ROWS, SampleTable, stack
 _STAMP = ("sec", "nanosec")
 
 
-def codec_for(path: str, channel: MessageChannel) -> Codec:
+def codec_for(channel: MessageChannel) -> Codec:
     """What reads a channel's messages.
 
     Raises
@@ -30,7 +30,7 @@ def codec_for(path: str, channel: MessageChannel) -> Codec:
     LogError
         If the encoding of the messages or of the schema is not known, or the schema cannot be read.
     """
-    place = f"{path}: topic {channel.topic!r}"
+    place = f"topic {channel.topic!r}"
     root, text = channel.type, channel.definition.decode("utf-8", errors="replace")
     form = channel.encoding, channel.definition_encoding
     try:
@@ -84,7 +84,7 @@ def topic_tables(
     LogError
         If half of the messages do not fit their schema, or their stamps are none.
     """
-    wanted, place = dict(paths), ""
+    wanted, place = dict(paths), f"topic {topic!r}"
     if stamp is not None:
         wanted |= dict(zip(_STAMP, stamp, strict=True))
 
@@ -122,8 +122,7 @@ def topic_tables(
             absent = {"case": "file", "file": file.path, "topic": topic}
             told.append(Notice("MESSAGES_LEFT_OUT", numbers=absent))
             continue
-        place = f"{file.path}: topic {topic!r}"
-        decoder = Decoder(wanted, codec_for(file.path, file.channel(topic)))
+        decoder = Decoder(wanted, codec_for(file.channel(topic)))
         found, lost, unchecked = 0, list[str](), False
         parts, size = list[SampleTable](), 0
         for messages in file.batches(channels):
