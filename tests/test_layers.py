@@ -73,7 +73,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy polars pyarrow",
     ),
     "batches": room(
-        "errors files guard identification limits options profile readers results "
+        "errors files guard identification limits options profile progress readers results "
         "runtime settings staging stores text",
         "distributed polars pyarrow pydantic",
     ),

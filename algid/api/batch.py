@@ -21,7 +21,7 @@ from algid.options import Option, flag
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
-    from algid.batches.jobs import Job, JobRecord
+    from algid.batches.jobs import Job
     from algid.batches.run import Batched
     from algid.settings import Settings
 Size = Annotated[str | int, Option(check=Annotated[ByteSize, Field(ge=1 << 29)])]
@@ -159,10 +159,6 @@ def batch(
             job = replace(job, trouble=str(error))
         return Task(job, asked, place, of_job, known, report)
 
-    def ended_job(last: JobRecord, done: int, total: int) -> None:
-        if progress is not None:
-            progress(f"{last.job.name[:50]}: {last.status.value}", done, total)
-
     look = partial(jobs_of, names, place, "logs" if known is None else "loaded", links)
     jobs = [] if watch else look()
     if not (jobs or watch):
@@ -189,7 +185,7 @@ def batch(
 
             folder = None if is_url(place) else Path(place, FOLDER)
             submit, slots = stack.enter_context(cluster(scheduler, folder, timeout))
-        running = Batch(store, task_of, submit, slots, ended_job, shared=part is not None)
+        running = Batch(store, task_of, submit, slots, progress, shared=part is not None)
         stack.enter_context(stopped_by_signals(running.stop))
         if watch:
             ended = running.watch(look, retry_failed, complain)

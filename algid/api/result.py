@@ -97,7 +97,9 @@ class Result(results.Result):  # noqa: D101
     def __str__(self) -> str:
         from algid.report.terminal import brief
 
-        return "\n".join([self.subject, *brief(self)])
+        others = f" and {len(self.more_logs)} more" if self.more_logs else ""
+        subject = f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{others}"
+        return "\n".join([subject, *brief(self)])
 
     __repr__ = __str__
 

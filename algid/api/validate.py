@@ -15,7 +15,6 @@ from algid.base.errors import Exit, SettingError, exit_of
 from algid.base.limits import within
 from algid.notices import Notice, lossy
 from algid.options import Option, flag
-from algid.results import Result
 from algid.results.verdict import judged_errors
 
 if TYPE_CHECKING:
@@ -103,11 +102,9 @@ def validate(
     from algid.identification.validate import Validated, predictor_of
     from algid.identification.validate import validate as predicted
 
-    urdf = None
-    if not isinstance(result, Result) and Path(result).suffix == ".urdf":
-        urdf = Path(result)
-    earlier = result if urdf is None else None
-    own, logs, loaded = meant(profile, options, logs, loaded, earlier=earlier)
+    file = called(result)
+    known = None if Path(file).suffix == ".urdf" else opened(result)
+    own, logs, loaded = meant(profile, options, logs, loaded, earlier=known)
     judged = () if max_error is None else tuple(judged_errors(opened(result), max_error))  # type: ignore[arg-type]  # no path by now
     if logs is None and loaded is None:
         if max_error is None:
@@ -115,11 +112,9 @@ def validate(
                 f"validate: expected a log, found none; give one, or {flag('max_error')}"
             )
         return Validated(judged=judged)
-    known, file = None, called(result)
-    if urdf is not None:
-        model = read_urdf(urdf, own)
+    if known is None:
+        model = read_urdf(Path(file), own)
     else:
-        known = opened(result)
         own = reused(own, known, file)
         model = predictor_of(as_logged(known, own), file)
     gravity = model.model.gravity

@@ -20,6 +20,7 @@ from typing import Any
 from algid import __version__
 from algid.base.errors import AlgidError, OutputError, text_of
 from algid.base.files import refuse_links, writing
+from algid.base.progress import Progress
 from algid.base.staging import TEMPORARY, delete_leftovers
 from algid.base.stores import Store, is_url
 from algid.batches.job import Task, is_full, redacted, run_task
@@ -93,7 +94,7 @@ class Batch:
     task_of : gives what is to be done of a job
     submit : hands a call to a worker, and gives its future
     slots : how many are handed out at once
-    progress : called with the record of each job that ends, and how many of how many have
+    progress : called with each job that ends, and how many of how many have
     shared : whether other batches do other jobs of the same OUT
     """
 
@@ -101,7 +102,7 @@ class Batch:
     task_of: Callable[[Job], Task]
     submit: Callable[..., Future[Any]]
     slots: int
-    progress: Callable[[JobRecord, int, int], object]
+    progress: Progress | None = None
     shared: bool = False
     ran: int = 0
     written: bool = False
@@ -232,7 +233,9 @@ class Batch:
                     waiting.append(task)
                 else:
                     self.ran += 1
-                    self.progress(record, total - len(waiting) - len(running), total)
+                    if self.progress is not None:
+                        stage = f"{record.job.name[:50]}: {record.status.value}"
+                        self.progress(stage, total - len(waiting) - len(running), total)
         for future in running:
             future.cancel()
         return len(waiting) + len(running)

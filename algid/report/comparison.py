@@ -14,7 +14,7 @@ from pydantic_core import to_json
 from algid.arm import FloatArray
 from algid.base.files import whole_file
 from algid.base.significance import NORMAL, sigmas
-from algid.base.text import ABSENT, cells, counted, file_name, joined, percent, visible
+from algid.base.text import ABSENT, cells, counted, joined, percent, visible
 from algid.notices import Grade, Verdict
 from algid.report.document import Document, Section, Table
 from algid.report.plot import down
@@ -123,12 +123,9 @@ class Comparison:
         return to_json(content, indent=2, inf_nan_mode="null").decode() + "\n"
 
 
-def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> Comparison:
-    """Lay two `results` or more side by side.
-
-    `labels` are what to call them, by default the names of their first logs.
-    """
-    shown = list(map(visible, labels or [file_name(result.log.path) for result in results]))
+def compare(results: Sequence[Result], labels: Sequence[str]) -> Comparison:
+    """Lay two `results` or more side by side; `labels` are what to call them."""
+    shown = list(map(visible, labels))
     if len(set(shown)) < len(shown):
         shown = [f"{number} {label}" for number, label in enumerate(shown, start=1)]
     return Comparison(shown, results)

@@ -18,7 +18,6 @@ from algid.results.model import (
     WhitenessTest,
     read_result,
     result_json,
-    result_schema,
     write_result,
 )
 
@@ -40,6 +39,5 @@ __all__ = [
     "WhitenessTest",
     "read_result",
     "result_json",
-    "result_schema",
     "write_result",
 ]

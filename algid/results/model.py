@@ -440,17 +440,6 @@ class Result(_Model):
         """Whether both hold the same, whatever else either can do."""
         return isinstance(other, Result) and dict(self) == dict(other)
 
-    @property
-    def subject(self) -> str:
-        """Whose estimate it is, and of which logs."""
-        others = f" and {len(self.more_logs)} more" if self.more_logs else ""
-        return f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{others}"
-
-
-def result_schema() -> dict[str, Any]:
-    """JSON Schema of `result.json`."""
-    return Result.model_json_schema(mode="serialization")
-
 
 def result_json(result: Result) -> str:
     """The text of `result.json`."""

@@ -52,7 +52,7 @@ def test_what_is_no_jobs_fault_ends_the_batch_and_what_is_fails_alone(tmp_path: 
     faults: list[BaseException] = [CallFailedError("as asked"), WorkerDiedError("as asked"), killed]
     outcomes: list[BaseException] = [CancelledError(), OSError("as asked"), *reversed(faults)]
     while outcomes:
-        batch = Batch(open_store(str(tmp_path)), task_of, submit, 1, lambda *_: None)
+        batch = Batch(open_store(str(tmp_path)), task_of, submit, 1)
         ended = batch.run([Job("a", ("a.csv",))], retry_failed=True)
         ends.append(ended.stopped or ended.records[0].status.value)
     assert ends[:3] == ["failed", "killed", "killed"]

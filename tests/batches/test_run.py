@@ -78,7 +78,7 @@ def batch_of(
 ) -> Batch:
     """A batch on `out` that runs its jobs in this process."""
     task_of = partial(Task, settings=settings, out=str(out), report=report)
-    return Batch(open_store(str(out)), task_of, (here or Here()).submit, 1, lambda *_: None)
+    return Batch(open_store(str(out)), task_of, (here or Here()).submit, 1)
 
 
 QUICK: Any = {"estimator": "weak", "model": "plain", "report": False}

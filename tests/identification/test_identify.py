@@ -18,7 +18,7 @@ from algid.identification.identify import identify
 from algid.identification.recordings import open_source
 from algid.log import Log
 from algid.profile import Profile
-from algid.results import Status, read_result, result_schema
+from algid.results import Result, Status, read_result
 from algid.settings import Settings
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.sensors import Sensors
@@ -71,7 +71,7 @@ def test_folder_holds_schema_valid_result_and_flat_series(
     result = identify(*wide, PAPER, out=tmp_path)
     folder = tmp_path / "case1-unloaded.algid"
     content = json.loads((folder / "result.json").read_text())
-    jsonschema.validate(content, result_schema())
+    jsonschema.validate(content, Result.model_json_schema(mode="serialization"))
     assert content["schema_version"] == 4
     assert read_result(folder) == result
     series = pl.read_parquet(folder / "estimates.parquet")
