@@ -196,10 +196,8 @@ class Settings(BaseModel):
         """For `result.json`; complex poles as text, the paper's where none are set."""
         from algid.signals.observers import PAPER_POLES
 
-        poles: list[float | str] = []
-        for pole in self.poles or PAPER_POLES:
-            poles.append(float(pole.real) if pole.imag == 0 else str(complex(pole)))
-        return dict(self) | {"poles": poles}
+        poles = map(complex, self.poles or PAPER_POLES)
+        return dict(self) | {"poles": [str(one) if one.imag else one.real for one in poles]}
 
     def _check_terms(self) -> None:
         if not self.terms:

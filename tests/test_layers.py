@@ -49,7 +49,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "errors files limits methods model options physics profile signals", "pydantic"
     ),
     "results": room(
-        "criteria errors files log model names notices options physics significance text",
+        "arm criteria errors files log model names notices options physics significance text",
         "numpy polars pydantic"),
     "synth": room("arm errors files limits log options progress", "numpy pydantic scipy"),
     "table4": room("arm estimators limits log model names results synth"),

@@ -44,9 +44,8 @@ def guide(topic: Annotated[str, Option(suggested=lambda: TOPICS)] | None = None)
     $ algid guide start
     """
     if topic is None:
-        texts = ((FOLDER / f"{name}.md").read_text(encoding="utf-8") for name in TOPICS)
-        titles = (text.partition("\n")[0].removeprefix("# ") for text in texts)
-        return str(_tables().contents(dict(zip(TOPICS, titles, strict=True))))
+        titles = {name: text_of(name).partition("\n")[0].removeprefix("# ") for name in TOPICS}
+        return str(_tables().contents(titles))
     if topic in TOPICS:
         return text_of(topic)
     try:

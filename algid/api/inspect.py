@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -140,6 +139,5 @@ def answer(found: Inspection, given: Mapping[str, Any]) -> Answer:
     remarks = []
     if "write_profile" in given:  # a log that needs a profile is what one is written for
         file = profile_file(given["write_profile"])
-        again = shlex.join(["algid", "inspect", str(given["log"]), flag("profile"), str(file)])
-        ended, remarks = Exit.OK, [f"wrote {file}; edit it, then try: {again}"]
+        ended, remarks = Exit.OK, [f"wrote {file}; edit it, then give it by {flag('profile')}"]
     return Answer(shown(), lambda: json.dumps(found.as_dict(), indent=2), remarks, exit=ended)

@@ -45,7 +45,7 @@ from algid.options import (
     refuse_moved,
 )
 from algid.profile import Effort, Profile, lasting, load_profile, over, with_settings
-from algid.settings import DEFAULTS, OF_BOTH, Settings
+from algid.settings import OF_BOTH, Settings
 
 if TYPE_CHECKING:
     from algid.identification.recordings import LogLike
@@ -227,15 +227,13 @@ def described(taker: Callable[..., Any]) -> tuple[list[str], dict[str, str]]:
 
     Of a parameter that is the first sentence.
     """
-    above, *rest = re.split(r"\n\n([A-Z]\w+)\n-+\n", inspect.cleandoc(taker.__doc__ or ""))
-    sections, helps = dict(zip(rest[::2], rest[1::2], strict=True)), dict[str, str]()
-    for entry in re.split(r"\n(?=\S)", sections.get("Parameters", "")):
-        names, _, body = entry.partition("\n")
+    text, helps = inspect.cleandoc(taker.__doc__ or ""), dict[str, str]()
+    for names, body in re.findall(r"(?m)^\**(\w[\w, ]*) : .*\n((?:    .*\n)*)", text):
         first = re.split(r"(?<=\.)\s", " ".join(body.split()))[0]
-        for name in names.partition(" : ")[0].split(", "):
-            helps[name.strip("*")] = first
-    example = sections.get("Examples", "").partition("\n\n")[0].replace("$", "Example:")
-    return [" ".join(one.split()) for one in (*above.split("\n\n"), example)], helps
+        helps |= dict.fromkeys(names.split(", "), first)
+    shown = re.sub(r"(?s)\nParameters\n.*\nExamples\n-+\n", "\n", text).replace("$", "Example:")
+    above = shown.partition("\n\n>>> ")[0].split("\n\n")
+    return [" ".join(one.split()) for one in above], helps
 
 
 def refuse_unknown(options: Iterable[str], known: Collection[str]) -> None:
@@ -261,7 +259,7 @@ def settings_of(
     own = {name: options[name] for name in options if name in Settings.model_fields}
     asked = (settings or Settings()).but(**own)
     of_profile = {name: options[name] for name in options if name not in own or name in OF_BOTH}
-    shared = {name: value for name, value in asked if name in OF_BOTH and value != DEFAULTS[name]}
+    shared = asked.model_dump(include={*OF_BOTH}, exclude_defaults=True)
     return asked, of_profile | shared
 
 
@@ -335,7 +333,7 @@ def set_by(lines: Iterable[str], known: Collection[str]) -> dict[str, Any]:
     found = dict[str, Any]()
     for line in lines:
         name, equals, text = line.partition("=")
-        if not equals or not name.strip():
+        if not equals:
             raise SettingError(f"{flag('set')} {line}: expected KEY=VALUE like tau1.sign=-1")
         value: Any = text.strip()
         with suppress(ValueError, RecursionError):

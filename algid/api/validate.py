@@ -103,8 +103,8 @@ def validate(
     from algid.identification.validate import validate as predicted
 
     file = called(result)
-    known = None if Path(file).suffix == ".urdf" else opened(result)
-    own, logs, loaded = meant(profile, options, logs, loaded, earlier=known)
+    earlier = None if Path(file).suffix == ".urdf" else result
+    own, logs, loaded = meant(profile, options, logs, loaded, earlier=earlier)
     judged = () if max_error is None else tuple(judged_errors(opened(result), max_error))  # type: ignore[arg-type]  # no path by now
     if logs is None and loaded is None:
         if max_error is None:
@@ -112,6 +112,7 @@ def validate(
                 f"validate: expected a log, found none; give one, or {flag('max_error')}"
             )
         return Validated(judged=judged)
+    known = None if earlier is None else opened(earlier)
     if known is None:
         model = read_urdf(Path(file), own)
     else:

@@ -387,9 +387,7 @@ class Result(_Model):
     @property
     def torque_model(self) -> TorqueModel | None:
         """The terms of the torque that were fitted; None of an estimator that has no choice."""
-        if self.fit is None:
-            return None
-        return self.fit.model
+        return None if self.fit is None else self.fit.model
 
     @property
     def estimates(self) -> dict[str, Estimate]:
@@ -418,23 +416,19 @@ class Result(_Model):
 
         None without error bars.
         """
-        if self.fit is None:
-            return None
-        import numpy as np
-
-        return np.array(self.fit.covariance, dtype=np.float64)
+        return None if self.fit is None else self.fit.covariance_of(self.fit.covariance_names)
 
     def to_frame(self) -> Any:
         """The estimates as a polars frame: parameter, estimate, std, low, high, unit, status."""
         import polars as pl
 
-        names = ("parameter", "estimate", "std", "low", "high", "unit", "status")
-        kinds = (pl.String, *[pl.Float64] * 4, pl.String, pl.String)
+        texts, numbers = ("unit", "status"), ("estimate", "std", "low", "high")
+        kinds = dict.fromkeys(numbers, pl.Float64) | dict.fromkeys(texts, pl.String)
         rows = [
             (name, one.estimate, one.std, *(one.ci95 or (None, None)), one.unit, one.status.value)
             for name, one in self.estimates.items()
         ]
-        return pl.DataFrame(rows, dict(zip(names, kinds, strict=True)), orient="row")
+        return pl.DataFrame(rows, {"parameter": pl.String, **kinds}, orient="row")
 
     def __eq__(self, other: object) -> bool:
         """Whether both hold the same, whatever else either can do."""

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from algid.arm import CONSTANT_NAMES
 from algid.base.criteria import SAME_LENGTH
 from algid.base.errors import ResultError, SettingError
 from algid.base.files import read_toml
 from algid.base.names import outside, within
 from algid.base.significance import SURE
 from algid.base.text import counted, percent, significant, visible
-from algid.model import CHOICES, EVERY_TERM, K1, K2, K3, K4, K5, K6, K7
+from algid.model import CHOICES, EVERY_TERM
 from algid.notices import (
     Notice,
     Remedy,
@@ -35,7 +36,6 @@ from algid.physics.parameters import BODY
 if TYPE_CHECKING:
     from algid.results.model import Estimate, Result, TorquePrediction
 
-CONSTANTS = (K1, K2, K3, K4, K5, K6, K7)
 LEAST_R2 = 0.9  # below, a tenth of the torque's power is not the model's
 WORST_R2 = 0.5  # below, most of it is not: wrong angles, signs or units, or not this arm
 MOST_CLIPPED = 2.0  # percent of the samples: with more, a torque that is cut off leads the reasons
@@ -152,7 +152,7 @@ def _reasons(result: Result) -> Iterator[Notice]:
     asked = requested(result)
     for status in UNSURE:
         names = [visible(name) for name, one in asked.items() if one.status == status]
-        record = not causes and not {*CONSTANTS}.isdisjoint(names)
+        record = not causes and not {*CONSTANT_NAMES}.isdisjoint(names)
         if names:
             yield Notice(status, numbers={"names": names, "record": record})
     wide = [

@@ -163,8 +163,7 @@ def test_a_profile_that_is_there_is_refused_before_the_log_is_read(tmp_path: Pat
     log, new = tmp_path / "log.csv", tmp_path / "new.toml"
     log.write_text("t,a\n0,1\n1,2\n")  # which nothing reads without a profile
     done = call("inspect", log, "--write-profile", new)
-    again = f"algid inspect {log} --profile {new}"
-    assert (done.code, done.err) == (0, f"wrote {new}; edit it, then try: {again}\n")
+    assert (done.code, done.err) == (0, f"wrote {new}; edit it, then give it by --profile\n")
 
 
 SHORT = ("--format", "csv", "--rate", "200", "--duration", "0.5")
