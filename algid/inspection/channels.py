@@ -354,22 +354,20 @@ def rests(log: Log, whole: bool) -> Iterator[Notice]:
     The log does not say which it is: the rest is named, with the flags that leave it out, and
     stays.
     """
-    few, rests, flags = max(4, round(0.02 / log.period)), [], {}
+    few, flags = max(4, round(0.02 / log.period)), dict[str, float]()
     # how far noise and encoder let an angle be from its place
     room = [
         [max(8 * noise_floor(theta), 2 * grid_step(theta), _STILL * float(np.ptp(theta)))]
         for theta in log.theta
     ]
-    for flag, step, word in (("start", 1, "first"), ("end", -1, "last"))[: 1 + whole]:
+    for flag, step in (("start", 1), ("end", -1))[: 1 + whole]:
         theta, t = log.theta[:, ::step], log.t[::step]
         away = np.abs(theta - medians(theta[:, :few])[:, None]) > room
         left = np.flatnonzero(away.any(axis=0))
         if not left.size:  # it rests all the time
             return
         edge = float(t[max(left[0] - 1, 0)])
-        lasts = abs(edge - float(t[0]))
-        if lasts >= _REST:
-            rests.append(f"for its {word} {lasts:.3g} s")
+        if abs(edge - float(t[0])) >= _REST:
             flags[flag] = float(f"{edge:.4g}")
-    if rests:
-        yield Notice("RESTS", numbers={"rests": rests}, remedies=(Remedy(flags),))
+    if flags:
+        yield Notice("RESTS", remedies=(Remedy(flags),))

@@ -33,22 +33,6 @@ from algid.signals.segments import stretches
 _SMALL = np.pi / 4
 _SAME = 1e-3  # of a scale or rad: as good as equal
 PLAIN = ChannelReading("", "rad")
-_WRONG = {
-    "joints": "the joints are swapped",
-    "theta.source": "the angles of the joints are swapped",
-    "tau.source": "the torques of the joints are swapped",
-    "signs": "the signs of the joints are {value}",
-    "theta.sign": "the sign of θ{joint} is wrong",
-    "tau.sign": "the sign of τ{joint} is wrong",
-    "theta.unit": "θ{joint} is in {value}",
-    "theta.gear_ratio": "θ{joint} counts {value:.4g} times the joint's angle",
-    "second_angle": "θ2 is {value}",
-    "drive": "the second motor stands at the {value}",
-    **dict.fromkeys(("effort", "gravity"), "the torques carry the arm's weight"),
-    "zero": "θ1 is zero where link 1 is {value}",
-    "offsets": "the angles have to be offset by {value} rad",
-}
-"""What is wrong with a log, by the setting that mends it."""
 # weight in N m to inertia in kg m^2: a fifth of g/l for links of 1.5 m
 _LEAST_PULL = 1.3
 _OF_WEIGHT = 0.01  # of a torque: what weight must explain to be there
@@ -117,17 +101,13 @@ def mend(origin: Origin, judgement: Judgement | None) -> Notice | None:
             best, settings = weighed, {"effort": "raw", "gravity": Model().gravity}
     if not settings:  # without settings it is how the log was read
         return None
-    wrong, broken = [], judgement.as_read.broken
-    for name, value in settings.items():
-        channel, dot, key = name.partition(".")
-        form = _WRONG[channel.rstrip("12") + dot + key]
-        wrong.append(form.format(joint=channel[-1], value=value))
+    broken = judgement.as_read.broken
     left, then = (100 * float(one.left.max()) for one in (judgement.as_read, best))
     contradiction = f"{left:.3g} % of a torque stays unexplained, {then:.2g} % otherwise"
     if broken:
         worst = min(broken, key=broken.__getitem__)
         contradiction = f"{worst} is broken by {round(-broken[worst]):,} σ"
-    numbers = {"wrong": " and ".join(dict.fromkeys(wrong)), "contradiction": contradiction}
+    numbers = {"wrong": list(settings), "contradiction": contradiction}
     return Notice("WRONG_CONVENTION", numbers=numbers, remedies=(Remedy(settings),))
 
 

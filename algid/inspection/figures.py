@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -116,19 +117,14 @@ def dynamic_figures(judgement: Judgement | None) -> DynamicFigures | None:
 
 
 def noise_floor(values: FloatArray) -> float:
-    """Robust deviation of third differences over √20: smooth motion has none."""
+    """Standard deviation of noise, by the median size of third differences: smooth motion has none.
+
+    1.4826 times it is normal noise's deviation, robust to outliers; a third difference has √20 of a
+    value's.
+    """
     if values.size < 4:
         return 0.0
-    return float(robust_deviation(differences(values, 3)) / np.sqrt(20))
-
-
-def robust_deviation(values: FloatArray) -> float:
-    """Standard deviation of normal noise, robust to outliers: 1.4826 times the median deviation.
-
-    Of many values those that `thinned` leaves.
-    """
-    values = thinned(values)
-    return 1.4826 * median(np.abs(values - median(values)))
+    return 1.4826 * median(np.abs(differences(values, 3))) / math.sqrt(20)
 
 
 def grid_step(values: FloatArray) -> float:

@@ -23,8 +23,7 @@ from algid.report.tables import settings_of
 from algid.results import Result
 from algid.results.rows import rows_of
 
-FIRST = "{0.name} | {1} | {0.with_half} |  | {0.unit} | {0.status} | "
-OTHER = "{0.name} | {1} | {0.with_half} | {2:+.1f} | {0.unit} | {0.status} | {3}"
+ROW = "{0.name} | {1} | {0.with_half} | {2:+.1f} | {0.unit} | {0.status} | {3}"
 ASIDE = re.compile(r"command|used\..*|.*told")
 """Settings that are no difference: a command names the logs and says again what is set."""
 FAR = sigmas()
@@ -94,7 +93,7 @@ class Comparison:
                     row = next(rows_of(result, {name: result.estimates[name]}))
                     far = self.sigma[log, place]
                     off = percent(numbers[log, place] - numbers[0, place], numbers[0, place], 3)
-                    estimates.append(cells(OTHER if log else FIRST, row, label, far, off))
+                    estimates.append(cells(ROW, row, label, far, off))
         for name, values in self.settings.items():
             for label, value in zip(self.labels, values, strict=True):
                 settings.append((visible(name), label, visible(value)))

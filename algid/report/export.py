@@ -28,7 +28,6 @@ from algid.base.names import stacked
 from algid.base.progress import Progress
 from algid.base.ros2 import HEADER, headed
 from algid.report.series import facts_of, stretches
-from algid.results import read_result
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -51,7 +50,6 @@ def export_mcap(folder: Path, progress: Progress | None = None) -> Path:
     OutputError
         If the log cannot be written.
     """
-    read_result(folder)
     files = {name: folder / f"{name}.parquet" for name in ("torque", "estimates", "loaded")}
     return write_mcap(folder / "estimates.mcap", files, progress)
 

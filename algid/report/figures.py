@@ -106,8 +106,7 @@ def residual(folder: Path) -> Panels | None:
         x, y, low, high = stacked(own, ("x", "value", "low", "high"))
         panels.band(place, x, low, high, "95 % band of white noise")
         if kind == "autocorrelation":
-            stems = np.stack([0 * y, y, np.nan * y], axis=1).ravel()
-            panels.add(place, np.repeat(x, 3), stems, "residual", "stems")
+            panels.add(place, x, y, "residual", "stems")
             panels.axes(place, "lag, s")
             inside.append(f"{np.count_nonzero((y >= low) & (y <= high))} of {y.size}")
             continue

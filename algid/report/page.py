@@ -62,7 +62,7 @@ def result_document(
     result: Result, folder: Path | None = None, progress: Progress | None = None
 ) -> Document:
     """The report of an identification; with its `folder` also the figures and its samples."""
-    fit, leads, raw = result.fit, settles(result.estimator), None
+    fit, raw = result.fit, None
     names = [file_name(log.path) for log in result.logs]
     arm, other, zero = parameter_tables(result)
     first, plots, paper = list[Content](arm), list[Section](), list[Content]()
@@ -90,9 +90,8 @@ def result_document(
         Section("fit", "Noise, whiteness and bounds", fit_tables(fit), folded=True),
         Section("data", "Data quality", [notes, *log_tables(result.logs)], folded=True),
         Section("settings", "Settings and provenance", made_by, folded=True),
+        Section("paper", title, [*paper, *paper_tables(result)], not settles(result.estimator)),
     ]
-    of_paper = Section("paper", title, [*paper, *paper_tables(result)], not leads)
-    sections.insert(1 if leads else len(sections), of_paper)
     constants = [row[4] for row in arm[0].rows]
     return Document(
         verdict=result.verdict,

@@ -18,7 +18,6 @@ from algid.base.text import (
     file_name,
     joined,
     resolved,
-    significant,
     unit_text,
 )
 from algid.notices import NAMED, flat
@@ -103,8 +102,7 @@ def prediction_table(found: Mapping[str, TorquePrediction | None]) -> Table:
             rows.append((where, "too short", *[ABSENT] * 6))
             continue
         filters[f"Filter: {one.filter}."] = None
-        stands = any(one.rmse_rest or ())
-        states = (one.rmse_moving, one.rmse_rest, one.rmse_held) if stands else (None,) * 3
+        states = one.rmse_moving, one.rmse_rest, one.rmse_held
         for joint in (0, 1):
             values = one.rmse[joint], 100 * one.nrmse[joint], one.r2[joint]
             more = [of and of[joint] for of in states]
@@ -174,16 +172,12 @@ def settings_table(settings: Mapping[str, Any]) -> Table:
 
 def settings_of(result: Result) -> dict[str, str]:
     """What was asked for, how the first log of each kind was read, and what the logs decided."""
-    every, model, fit = dict(result.settings), result.torque_model, result.fit
+    every, fit = dict(result.settings), result.fit
     for log in reversed(result.logs):
         if log.reading is not None:
             every[f"{log.role} log"] = asdict(log.reading)
-    if model is not None:
-        every["used.terms"] = ", ".join(model.terms) or "plain"
-        if "coulomb" in model.terms:
-            every["used.Coulomb friction over"] = f"{significant(model.coulomb_speed, 2)} rad/s"
-    if fit is not None and fit.torque_hold is not None:
-        every["used.torque_hold"] = fit.torque_hold.used
+    if fit is not None:
+        every["used"] = fit.model_dump(include={"model": {"terms"}, "torque_hold": {"used"}})
     return in_words(every)
 
 

@@ -13,7 +13,7 @@ from algid.arm import CONSTANT_NAMES as ARM
 from algid.base.text import ABSENT, cells, counted, joined, lines_of, printable, visible
 from algid.model import DELAYS
 from algid.notices import MOST_REASONS, Grade, Verdict, codes_of
-from algid.report.document import Document, Kind, Table
+from algid.report.document import Document, Table
 from algid.results import Result, Status
 from algid.results.rows import rows_of
 from algid.results.verdict import share_text
@@ -110,13 +110,13 @@ def print_document(document: Document, console: Console) -> None:
     console.print(shown, soft_wrap=True)
     for table in document.tables():
         console.print()
-        print_table(table, console, failed=judged.failed)
+        print_table(table, console)
 
 
-def print_table(table: Table, console: Console, *, failed: bool = False) -> None:
+def print_table(table: Table, console: Console) -> None:
     """Print one table, less the last columns where the console has no room for all.
 
-    No digit is ever cut off. No status of a result that failed is shown as good.
+    No digit is ever cut off.
     """
     from rich import box
     from rich.cells import cell_len
@@ -132,7 +132,7 @@ def print_table(table: Table, console: Console, *, failed: bool = False) -> None
         collapse_padding=True,
     )
     rows = [[visible(cell, LONGEST) for cell in row] for row in table.rows]
-    shown, room = list[tuple[int, Kind]](), console.width + 2
+    shown, room = list[int](), console.width + 2
     for place, heading, kind in table.heads:
         cells = [heading, *(row[place] for row in rows)]
         words = cells if kind == "number" else " ".join(cells).split()
@@ -140,18 +140,14 @@ def print_table(table: Table, console: Console, *, failed: bool = False) -> None
         room -= least + 2
         if shown and room < 0:
             break
-        shown.append((place, kind))
+        shown.append(place)
         side: Literal["left", "right"] = "right" if kind == "number" else "left"
         # text gives way before numbers and words do
         whole = max(map(cell_len, cells)) <= least
-        made.add_column(Text(heading), justify=side, overflow="fold", no_wrap=whole)
-    styles = {"name": "bold", "status": "bold yellow"}
+        style = "bold" if kind == "name" else ""
+        made.add_column(Text(heading), style=style, justify=side, overflow="fold", no_wrap=whole)
     for row in rows:
-        line = []
-        for place, kind in shown:
-            good = kind == "status" and row[place] == Status.OK and not failed
-            line.append(Text(row[place], "green" if good else styles.get(kind, "")))
-        made.add_row(*line)
+        made.add_row(*(Text(row[place]) for place in shown))
     console.print(made)
     if table.note:
         console.print(Text(visible(table.note, LONGEST), "dim"))

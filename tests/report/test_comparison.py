@@ -25,7 +25,7 @@ def test_a_difference_is_over_both_intervals(result: Result) -> None:
     assert found.sigma[1, 0] == pytest.approx(2.0, rel=1e-12)  # 1 over hypot(0.3, 0.4)
     assert found.largest_sigma == pytest.approx(2.0, rel=1e-12)
     assert found.tables()[0].rows == [
-        ("k6", "before", "1.00 ± 0.59", "", "N m s/rad", "OK", ""),
+        ("k6", "before", "1.00 ± 0.59", "–", "N m s/rad", "OK", "0"),
         ("k6", "after", "2.00 ± 0.78", "+2.0", "N m s/rad", "OK", "100"),
     ]
     content = json.loads(found.as_json())

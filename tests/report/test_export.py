@@ -12,7 +12,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from algid.base.errors import OutputError, ResultError
+from algid.base.errors import OutputError
 from algid.report.export import START_KEY, export_mcap
 from tests.report.folders import START_NS
 
@@ -58,14 +58,6 @@ def test_stamps_are_those_of_the_original_log(messages: dict[str, list[Any]]) ->
     stamp = found[1].decoded_message.header.stamp
     assert stamp.sec * 1_000_000_000 + stamp.nanosec == stamps[1]
     assert messages["/algid/loaded"][0].message.log_time == START_NS
-
-
-def test_a_folder_without_a_result_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ResultError, match=r"result\.json: cannot read it"):
-        export_mcap(tmp_path)
-    (tmp_path / "run1.algid").mkdir()
-    with pytest.raises(ResultError, match=r"; name .*run1\.algid$"):
-        export_mcap(tmp_path)
 
 
 def test_stamps_that_no_message_holds_are_refused(folder: Path) -> None:

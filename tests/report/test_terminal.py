@@ -52,15 +52,3 @@ def test_a_path_that_fits_nowhere_breaks_and_numbers_do_not() -> None:
     assert "1234567890" in text
     assert "a note" in text
     assert path in "".join(part for part in text.split() if part != "1234567890")
-
-
-def test_a_status_is_green_where_it_is_good_and_the_result_is_too() -> None:
-    def styled(failed: bool) -> str:
-        console = Console(file=io.StringIO(), width=100, force_terminal=True, no_color=False)
-        print_table(ESTIMATES, console, failed=failed)
-        assert isinstance(console.file, io.StringIO)
-        return console.file.getvalue()
-
-    assert "\x1b[32mOK" in styled(False)
-    assert "\x1b[1;33mNOT_IDENTIFIABLE" in styled(False)
-    assert "\x1b[1;33mOK" in styled(True)
