@@ -10,7 +10,6 @@ import polars as pl
 import pytest
 from scipy.stats import norm
 
-from algid.api.report import report
 from algid.batches.jobs import Job, JobRecord, JobStatus, jobs_frame
 from algid.fleet.history import history_of
 from algid.fleet.page import overview
@@ -54,6 +53,8 @@ def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
     assert [one.name for one in written] == ["findings.parquet", "fleet.html", "fleet.parquet"]
     assert sorted(done.err.splitlines()) == [f"wrote {one}" for one in written]
     assert pl.read_parquet(tmp_path / "page/fleet.parquet").height == 4
+    page = Page((tmp_path / "page/fleet.html").read_text(encoding="utf-8"))
+    assert (list(page.tables), list(page.figures)) == (["Findings", "Robots"], ["logs"])
 
 
 def test_every_log_is_a_point_with_its_interval(tmp_path: Path) -> None:
@@ -72,21 +73,6 @@ def test_every_log_is_a_point_with_its_interval(tmp_path: Path) -> None:
     windows = history.windows.filter(robot="r0", parameter="k6")
     assert typed(mean["y"]) == pytest.approx(windows["mean"].to_list(), rel=1e-6)
     assert typed(found["y"]) == pytest.approx([jobs["k6"][0]], rel=1e-6)  # a drift ends there
-
-
-def test_the_page_is_two_tables_and_a_figure(tmp_path: Path) -> None:
-    heard = list[tuple[str, int, int]]()
-    report(
-        [batch(tmp_path / "batch[1]")],
-        out=tmp_path / "page",
-        progress=lambda *step: heard.append(step),
-    )
-    assert heard == [("following", 0, 2), ("following", 1, 2)]
-    page = Page((tmp_path / "page/fleet.html").read_text(encoding="utf-8"))
-    assert list(page.tables) == ["Findings", "Robots"]
-    assert list(page.figures) == ["logs"]
-    assert {"numbers", "logs", "robots"} <= {own.get("id") for _, own in page.tags}
-    assert "<h1>Fleet</h1>" in page.text
 
 
 def test_a_name_that_attacks_is_text(tmp_path: Path) -> None:

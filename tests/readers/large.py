@@ -12,21 +12,18 @@ from pathlib import Path
 
 from mcap.writer import CompressionType
 from rosbags.rosbag1 import Writer
-from rosbags.typesys import Stores, get_typestore
 
 from algid.base.ros2 import JOINT_STATE
 from tests.readers import mcaps
-from tests.readers.mcaps import TOPIC, joint_state
+from tests.readers.mcaps import STORES, TOPIC, state_of
 
 
 def _messages(rows: int, *, ros1: bool = False) -> Iterator[tuple[str, int, bytes]]:
     """Joint states as ROS 2 or ROS 1 writes them: only their stamps differ."""
-    values = [(1.0, 2.0), (3.0, 4.0), (5.0, 6.0)]
-    body = joint_state(0, ("joint1", "joint2"), *values)
-    if ros1:
-        names = b"".join(struct.pack("<I", 6) + name for name in (b"joint1", b"joint2"))
-        lists = b"".join(struct.pack("<I2d", 2, *pair) for pair in values)
-        body = bytes(16) + struct.pack("<I", 2) + names + lists
+    store, head = (STORES[0], {"seq": 0}) if ros1 else (STORES[1], {})
+    message = state_of(store, 0, ("joint1", "joint2"), [1, 2], [3, 4], [5, 6], **head)
+    serialize = store.serialize_ros1 if ros1 else store.serialize_cdr
+    body = bytes(serialize(message, JOINT_STATE))
     for row in range(rows):
         stamp = struct.pack("<II", row // 1000, row % 1000 * 1_000_000)
         yield TOPIC, row * 1_000_000, body[:4] + stamp + body[12:]
@@ -40,8 +37,7 @@ def write_mcap(path: Path, rows: int) -> None:
 def write_bag(path: Path, rows: int) -> None:
     """A ROS 1 bag without packing."""
     with Writer(path) as writer:
-        store = get_typestore(Stores.ROS1_NOETIC)
-        connection = writer.add_connection(TOPIC, JOINT_STATE, typestore=store)
+        connection = writer.add_connection(TOPIC, JOINT_STATE, typestore=STORES[0])
         for _, stamp, data in _messages(rows, ros1=True):
             writer.write(connection, stamp, data)
 

@@ -61,7 +61,6 @@ REFUSED = {
         pa.array([SHORT], pa.int32()), pa.array([1.0])
     ),
     "interval": pa.array([(1, 2, 3)] * SHORT, pa.month_day_nano_interval()),
-    "list view": pa.array([[1.0]] * SHORT, pa.list_view(pa.float64())),
     "map": pa.array([[("a", 1)]] * SHORT, pa.map_(pa.string(), pa.int64())),
     "binary": pa.array([b"x"] * SHORT),
     "nothing": pa.nulls(SHORT),
