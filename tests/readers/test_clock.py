@@ -140,30 +140,14 @@ def test_samples_three_periods_apart_are_bridged_and_no_further() -> None:
     stamps = np.array([0, 10, 20, 30, 60, 70, 80, 111, 121, 131]) * MS
     other = series(stamps, tau1=stamps * 1.0)
     assert other.period == 10 * MS
-    asked = [
-        -1,
-        0,
-        30 * MS + 1,
-        60 * MS - 1,
-        80 * MS,
-        80 * MS + 1,
-        111 * MS - 1,
-        111 * MS,
-        131 * MS,
-        131 * MS + 1,
-    ]
-    assert other.covers(np.array(asked)).tolist() == [
-        False,
-        *[True] * 4,
-        False,
-        False,
-        True,
-        True,
-        False,
-    ]
+    ends = {-1: False, 0: True, 30 * MS + 1: True, 60 * MS - 1: True, 80 * MS: True}
+    ends |= {80 * MS + 1: False, 111 * MS - 1: False, 111 * MS: True}
+    ends |= {131 * MS: True, 131 * MS + 1: False}
+    asked = np.array([*ends])
+    assert other.covers(asked).tolist() == [*ends.values()]
     torn = series(np.array([0, 9, 10, 11, 12]) * MS, tau1=np.zeros(5))
     assert torn.covers(np.array([0, 1, 9 * MS])).tolist() == [True, False, True]
-    assert not series(stamps[:1], tau1=np.ones(1)).covers(np.array(asked)).any()
+    assert not series(stamps[:1], tau1=np.ones(1)).covers(asked).any()
     assert series(stamps[:2], tau1=np.ones(2)).error() == "tau1 0"
 
 

@@ -48,17 +48,12 @@ def test_the_units_are_those_known_here() -> None:
 @pytest.mark.parametrize("gear", [1.0, 100.0])
 def test_every_unit_on_either_side_of_a_gear(gear: float) -> None:
     """A motor turns `gear` times as far as its joint, and its torque is that much smaller."""
-    for unit, size in TORQUES.items():
-        found = readings({"tau1": {"unit": unit, "gear_ratio": gear}})["tau1"]
-        assert found.factor == pytest.approx(size * gear, rel=1e-12)
-    for unit, size in VELOCITIES.items():
-        channel = {"unit": unit, "gear_ratio": gear}
-        found = readings({"omega2": channel})["omega2"]
-        assert found.factor == pytest.approx(size / gear, rel=1e-12)
-        if unit in ANGLES:
-            assert readings({"theta2": channel})["theta2"].factor == pytest.approx(
-                size / gear, rel=1e-12
-            )
+    for name, units, turns in (
+        ("tau1", TORQUES, gear), ("theta2", ANGLES, 1 / gear), ("omega2", VELOCITIES, 1 / gear),
+    ):  # fmt: skip
+        for unit, size in units.items():
+            found = readings({name: {"unit": unit, "gear_ratio": gear}})[name]
+            assert found.factor == pytest.approx(size * turns, rel=1e-12)
     drive = {"torque_constant": 0.05, "gear_ratio": gear}
     for unit, size in (("A", 1), ("mA", 1e-3)):
         found = readings({"tau2": drive}, {"tau2": unit})["tau2"]

@@ -156,45 +156,34 @@ def test_a_summary_that_does_not_agree_with_the_file_loses_nothing_unseen(
 
 
 @pytest.mark.parametrize(
-    "damage",
-    [
-        lambda whole: poked(whole, -37, "<B", 7),
-        lambda whole: poked(whole, -36, "<Q", 21),
-        lambda whole: poked(whole, -28, "<Q", 7),
-        lambda whole: poked(whole, -12, "<I", 1),
-        lambda whole: whole[:-1],
-    ],
+    ("place", "form", "value"), [(-37, "<B", 7), (-36, "<Q", 21), (-28, "<Q", 7), (-12, "<I", 1)]
 )
 def test_a_damaged_footer_is_told_and_the_file_is_walked(
-    damage: Callable[[bytes], bytes], tmp_path: Path
+    place: int, form: str, value: int, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.mcap"
-    path.write_bytes(damage(made(path, LOG)))
+    path.write_bytes(poked(made(path, LOG), place, form, value))
     found = read_log(path)
     assert same(found, LOG)
     assert [(one.code, one.case) for one in found.notices] == [("DAMAGED_INDEX", "summary")]
 
 
-@pytest.mark.parametrize("tail", [b"", b"\x89MCAP0\r\n"])
-@pytest.mark.parametrize("before", ["message", "chunk", "index"])
+@pytest.mark.parametrize("behind", ["a chunk", "its index"])
 def test_an_end_of_the_data_that_stands_too_early_hides_no_loss(
-    before: str, tail: bytes, tmp_path: Path
+    behind: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.mcap"
-    content = made(path, use_chunking=before != "message")
+    content = made(path)
     start = summary_of(content)
     end = content[start - 13 : start]
     assert end[0] == 15
-    message = struct.pack("<BQ", 5, 22 + len(messages_of(LONG)[0][2]))
-    first, place = content.find(message), content.rfind(message)
-    if before != "message":
-        first, place = (chunks_of(path)[number].chunk_start_offset for number in (0, 3))
-    if before == "index":
-        first += chunks_of(path)[0].chunk_length
+    chunks = chunks_of(path)
+    first = chunks[0].chunk_start_offset + chunks[0].chunk_length * (behind == "its index")
     # all of it, but for the summary
-    whole = content[:first] + end + content[first:start] + tail
+    whole = content[:first] + end + content[first:start]
     assert len(beginning(path, whole)) == len(LONG)
-    found = beginning(path, poked(whole, place + len(end) + 1, "<Q", 3))
+    place = chunks[3].chunk_start_offset + len(end)
+    found = beginning(path, poked(whole, place + 1, "<Q", 3))
     assert len(found) < len(LONG)
     assert lost(found)
 
