@@ -61,10 +61,11 @@ def test_help_loads_no_numbers_and_hardly_searches_for_cycles_or_plugins() -> No
 def test_no_log_needs_pandas(tmp_path: Path, name: str) -> None:
     t = np.arange(2000) / 100
     columns = {channel: np.sin(t + place) for place, channel in enumerate(CHANNELS)} | {"t": t}
-    path = tmp_path / name
-    write = {"log.csv": pl.DataFrame.write_csv, "log.feather": pl.DataFrame.write_ipc}
-    if name in write:
-        write[name](pl.DataFrame(columns), path)  # type: ignore[operator]
+    path, frame = tmp_path / name, pl.DataFrame(columns)
+    if name == "log.csv":
+        frame.write_csv(path)
+    elif name == "log.feather":
+        frame.write_ipc(path)
     else:
         np.savez(path, **columns)  # type: ignore[arg-type]
     code = (

@@ -23,17 +23,6 @@ ALLOWED = {
 TIGHT = Limits(np.array([-1.0, 1.0]), ALLOWED, height=-0.3, lengths=np.array([0.4, 0.3]))
 
 
-def but(
-    height: float = -np.inf, middle: float | None = None, **allowed: float | list[float]
-) -> Limits:
-    """Those limits with others in place of some."""
-    changed = {
-        name: np.broadcast_to(np.array(one, dtype=float), 2) for name, one in allowed.items()
-    }
-    own = TIGHT.middle if middle is None else np.array([middle, 0.0])
-    return replace(TIGHT, middle=own, allowed=ALLOWED | changed, height=height)
-
-
 K = np.array([0.05, 1.0, 0.03, 4.0, 0.2, 0.3, 0.2])
 
 
@@ -100,7 +89,7 @@ def test_the_torque_is_that_of_the_worst_arm_on_either_side(box: bool) -> None:
 
 def test_a_weak_arm_rests_where_it_needs_least() -> None:
     loads = [load(0.05 * np.diag(K), box=True)]
-    weak = but(torque=[3.0, 2.5])
+    weak = replace(TIGHT, allowed=ALLOWED | {"torque": np.array([3.0, 2.5])}, height=-np.inf)
     rest = resting(weak, Model(), loads)
     grid = np.stack(
         np.meshgrid(np.linspace(-2, 0, 41), np.linspace(-1, 3, 41), indexing="ij")

@@ -49,7 +49,8 @@ def test_the_terms_that_are_there_are_chosen_and_no_other(
 
 def test_terms_that_physics_does_not_allow_or_that_need_another_are_left_out(bench: Bench) -> None:
     """Drives that push with the motion are as evident as friction is."""
-    pushed = replace(bench.log(sigma=1e-4), tau=bench.log(sigma=1e-4).tau - 0.1 * _signs(bench))
+    log = bench.log(sigma=1e-4)
+    pushed = replace(log, tau=log.tau - 0.1 * np.tanh(bench.bare.omega / 0.05))
     chosen = _of(pushed, candidates=("coulomb", "stribeck"))
     trials = {trial.term: trial for trial in chosen.trials}
     assert trials["coulomb"].reason == "left out: its value would contradict physics"
@@ -59,10 +60,6 @@ def test_terms_that_physics_does_not_allow_or_that_need_another_are_left_out(ben
     asked = _of(pushed, candidates=("coulomb",), kept=("coulomb",))
     assert asked.model.terms == ("coulomb",)
     assert asked.trials[0].reason == "asked for"
-
-
-def _signs(bench: Bench) -> np.ndarray:
-    return np.asarray(np.tanh(bench.bare.omega / 0.05))
 
 
 @pytest.mark.parametrize("samples", [6, -6], ids=["late", "early"])

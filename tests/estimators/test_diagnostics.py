@@ -22,7 +22,6 @@ from algid.estimators.diagnostics import (
 from algid.estimators.fit import Fit, alone, finish
 from algid.estimators.parametrisation import Shared
 from algid.model import Model
-from algid.notices import Notice
 
 from .conftest import Bench, problem_of
 
@@ -65,8 +64,6 @@ def test_a_friction_held_at_nothing_moves_the_others_as_conditional_normals(brok
             "which the logs contradict"
         ),
     )
-    before = Notice("BEFORE", "before")
-    assert constrained(replace(fit, notes=(before,))).notes == (before, note)
 
 
 def test_a_terms_worth_is_schwarzs_price_less_walds_statistic() -> None:

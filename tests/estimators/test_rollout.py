@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from algid.arm import FloatArray
 from algid.estimators.prediction import (
@@ -23,19 +22,12 @@ def push(t: FloatArray) -> FloatArray:
     return np.stack([2.5 * np.sin(4 * t), 0.7 * np.cos(5 * t)])
 
 
-@pytest.fixture(scope="module")
-def segment() -> Segment:
-    t = np.arange(0, 8 + DT / 2, DT)
-    moved = simulate(K, push, t)
-    return Segment(0.0, DT, moved.theta, moved.tau)
-
-
-def test_a_wrong_arm_does_as_its_simulation_says(segment: Segment) -> None:
+def test_a_wrong_arm_does_as_its_simulation_says() -> None:
     wrong = K * np.array([1, 1.1, 1, 1.1, 1, 1, 1])
-    score = rollouts(Model(), wrong, [segment], 8.0)
-    t = np.arange(len(segment)) * DT
+    t = np.arange(0, 8 + DT / 2, DT)
     true = simulate(K, push, t)
-    errors, starts = [], range(60, len(segment) - 60 - 100, 30)
+    score = rollouts(Model(), wrong, [Segment(0.0, DT, true.theta, true.tau)], 8.0)
+    errors, starts = [], range(60, t.size - 60 - 100, 30)
     for start in starts:
         ends = np.array([t[start], t[start + 100]])
         alone = simulate(wrong, push, ends, true.theta[:, start], true.omega[:, start])

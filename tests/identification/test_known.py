@@ -28,17 +28,6 @@ def weighed() -> Result:
     return identify(*logs, Settings(model="coulomb"), report=False)
 
 
-def changed(result: Result, group: str, name: str, **values: object) -> Result:
-    """The result with other fields of one of its estimates."""
-    estimates = dict(getattr(result, group))
-    estimates[name] = estimates[name].model_copy(update=values)
-    return result.model_copy(update={group: estimates})
-
-
-def without_fit(result: Result, **settings: object) -> Result:
-    return result.model_copy(update={"fit": None, "settings": result.settings | settings})
-
-
 @pytest.mark.parametrize(("hold", "share"), [("foh", 0.0), ("zoh", 0.5)])
 def test_a_torque_acts_after_half_its_hold_and_the_delay_found_or_else_set(
     weighed: Result, hold: str, share: float
@@ -66,7 +55,7 @@ def test_a_prior_that_a_result_cannot_give_is_refused_with_what_to_do(weighed: R
         ResultError,
         match=rf"^{where}: the result of --estimator refined has no error bars; identify with",
     ):
-        prior_of(without_fit(weighed), Model())
+        prior_of(weighed.model_copy(update={"fit": None}), Model())
     with pytest.raises(
         ResultError,
         match=r"^arm\.json: the result has no j2, s1, s2; use the flags it was made with$",
@@ -82,5 +71,7 @@ def test_a_prior_that_a_result_cannot_give_is_refused_with_what_to_do(weighed: R
         ResultError, match="leaves constants undetermined; identify from more logs first"
     ):
         prior_of(lost, model_of(weighed))
+    k4 = {"k4": Estimate(estimate=None, unit="N m")}
+    lost = weighed.model_copy(update={"parameters": weighed.parameters | k4})
     with pytest.raises(ResultError, match="leaves constants undetermined"):
-        prior_of(changed(weighed, "parameters", "k4", estimate=None), model_of(weighed))
+        prior_of(lost, model_of(weighed))

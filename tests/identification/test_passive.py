@@ -56,10 +56,6 @@ def log_of(name: str, passive: int, seed: int) -> Log:
     return scenes.log_of(name, passive, seed)
 
 
-def pieces_of(log: Log) -> list[Segment]:
-    return list(segments([log]))
-
-
 def identified(log: Segment, model: str = "auto") -> Result:
     stamps = np.arange(len(log), dtype=np.int64) * round(1e9 * DT)
     origin = Origin(
@@ -137,7 +133,7 @@ def test_instruments_tell_what_least_squares_takes_for_nothing() -> None:
 
 def test_instruments_that_forbidden_constants_come_of_do_not_stand() -> None:
     """A torque of the other sign turns the whole arm round, which no instrument makes physical."""
-    segments_of = pieces_of(log_of("case1", 2, 0))
+    segments_of = list(segments([log_of("case1", 2, 0)]))
     turned = [replace(segment, tau=-segment.tau) for segment in segments_of]
     assert robust.of_passive_joint(Problem([lambda: segments_of])) is not None
     assert robust.of_passive_joint(Problem([lambda: turned])) is None

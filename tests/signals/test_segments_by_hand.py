@@ -70,34 +70,30 @@ def test_a_stamp_within_a_thousandth_of_a_period_lies_on_the_grid(off: float, ta
     assert np.array_equal(whole.theta[:, 17], bent.theta[:, 17]) is taken
 
 
-def test_missing_samples_are_those_of_the_cubic_through_four_neighbours() -> None:
-    """Samples 12 and 13 are lost; SciPy's polynomial through 10, 11, 14 and 15."""
-    rng = np.random.default_rng(0)
-    kept = [n for n in range(30) if n not in (12, 13)]
-    log = replace(
-        log_at([*map(float, kept)]),
-        theta=rng.standard_normal((2, 28)),
-        tau=rng.standard_normal((2, 28)),
-    )
-    values = np.concatenate([one.theta for one in segments([log])], axis=1)
-    assert values.shape == (2, 30)
-    nodes = [kept.index(n) for n in (10, 11, 14, 15)]
-    cubic = BarycentricInterpolator(np.array([10.0, 11.0, 14.0, 15.0]), log.theta[:, nodes].T)
-    # rounding of stamps
-    np.testing.assert_allclose(values[:, 12:14], cubic(np.array([12.0, 13.0])).T, atol=1e-9)
-    np.testing.assert_allclose(values[:, :12], log.theta[:, :12], atol=1e-9)
+LOST = [float(n) for n in range(30) if n not in (12, 13)]
+LATE = [0.0, *(n + 0.2 for n in range(1, 11)), 11.0]
 
 
-def test_the_ends_of_a_stretch_use_the_four_samples_there() -> None:
-    rng = np.random.default_rng(1)
-    ms = [0.0, *(n + 0.2 for n in range(1, 11)), 11.0]
-    log = replace(log_at(ms), theta=rng.standard_normal((2, 12)))
-    (whole,) = found(log)
-    t = np.array(ms)
+@pytest.mark.parametrize(
+    ("ms", "at", "nodes"),
+    [
+        (LOST, 12, [10.0, 11.0, 14.0, 15.0]),
+        (LOST, 13, [10.0, 11.0, 14.0, 15.0]),
+        (LOST, 11, LOST[10:14]),
+        (LATE, 1, LATE[:4]),
+        (LATE, 10, LATE[8:]),
+    ],
+    ids=["lost", "lost too", "there", "first", "last"],
+)
+def test_a_sample_put_in_between_is_that_of_the_cubic_through_four_neighbours(
+    ms: list[float], at: int, nodes: list[float]
+) -> None:
+    """SciPy's polynomial through them; at the ends of a stretch through the four there."""
+    theta = np.random.default_rng(0).standard_normal((2, len(ms)))
+    (whole,) = found(replace(log_at(ms), theta=theta))
     assert whole.dt == pytest.approx(1e-3, rel=1e-9)
-    for at, nodes in ((1, slice(0, 4)), (10, slice(8, 12))):
-        cubic = BarycentricInterpolator(t[nodes], log.theta[:, nodes].T)
-        np.testing.assert_allclose(whole.theta[:, at], cubic(float(at)), atol=1e-9)
+    cubic = BarycentricInterpolator(np.array(nodes), theta[:, [ms.index(n) for n in nodes]].T)
+    np.testing.assert_allclose(whole.theta[:, at], cubic(float(at)), atol=1e-9)
 
 
 def test_the_period_is_the_mean_of_the_steps_near_the_usual_one() -> None:

@@ -87,20 +87,16 @@ KINDS: list[Callable[[], tuple[FloatArray, FloatArray]]] = [
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_motion_is_recovered(kind: Callable[[], tuple[FloatArray, FloatArray]]) -> None:
     log = log_of(*kind())
-    (whole,) = _whole(segments([log]))
-    start, dt, theta = whole
+    first, *others = segments([log])
+    assert all(part.continues for part in others)
+    start, dt = first.start, first.dt
+    theta = np.concatenate([part.theta for part in (first, *others)], axis=1)
     # the time base may be a little slower where every tenth sample is merged with a neighbour
     assert dt == pytest.approx(PERIOD, rel=0.03 if kind is half_a_period else 1e-3)
     t = log.stamp_ns[0] * 1e-9 + start + dt * np.arange(theta.shape[1])
     # a cluster's samples are right to its own length in time, 20 µs at 6 rad/s, a cubic between to
     # far less
     assert np.abs(theta - moving(t))[:, 20:].max() < (2e-4 if kind is batches else 1.3e-5)
-
-
-def _whole(parts: object) -> list[tuple[float, float, FloatArray]]:
-    found = list(parts)  # type: ignore[call-overload]
-    assert all(part.continues for part in found[1:])
-    return [(found[0].start, found[0].dt, np.concatenate([part.theta for part in found], axis=1))]
 
 
 @pytest.mark.parametrize("kind", KINDS)
