@@ -12,7 +12,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from algid.base.limits import LIMITS
 from algid.base.units import CURRENT, NANOSECONDS, TORQUE, is_foreign, unit_of
 from algid.log import KEY, IntArray, Reading, usual_period
 from algid.notices import Notice, Remedy
@@ -109,27 +108,6 @@ def _called(name: str, columns: Sequence[str]) -> list[str]:
         if own.stem in stems and part.joint in (None, own.joint):
             found.append(column)
     return found
-
-
-def in_json_schema(text: str) -> tuple[dict[str, str], list[str]]:
-    """By name the unit that a JSON schema has for a property, as metadata; its descriptions.
-
-    A list's may stand at its items, and properties within properties: ``state.effort``.
-    """
-    units, lines, waiting = dict[str, str](), list[str](), [("", object_in(text), 0)]
-    for name, one, depth in waiting:
-        for key in ("unit", "units"):
-            if isinstance(one.get(key), str):
-                units[f"{name}.unit"] = one[key]
-        if name:
-            lines.append(f"{name}: {one.get('description', '')}")
-        properties = one.get("properties")
-        inner = properties.items() if isinstance(properties, dict) else ()
-        within = [(f"{name}.{own}".lstrip("."), content) for own, content in inner]
-        within.append((name, one.get("items")))
-        if depth < LIMITS.definition_depth:
-            waiting += [(own, part, depth + 1) for own, part in within if isinstance(part, dict)]
-    return units, lines
 
 
 def lines_of(metadata: Mapping[str, str]) -> Iterator[str]:

@@ -21,7 +21,7 @@ from algid.readers.table_cells import TableFile
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_EXCESS, _SPLIT = "excess", "split"
+_EXCESS = "excess"
 _FRAME_ROWS = 1 << 16
 
 
@@ -105,12 +105,13 @@ def _batches(
                 schema[own] = pl.Int64 if exact else pl.Float64
     # polars drops cells past the last column without a word: one more column catches them
     schema[_EXCESS] = pl.String
-    split = pl.lit(value=False)
+    wrong = pl.col(_EXCESS).is_not_null()
     if quoted:
         # a cell that holds the cells of another row has taken in that row
         line = rf"\n([^\n]*{re.escape(dialect.separator)}){{{len(dialect.schema) - 1}}}"
         texts = [name for name, kind in schema.items() if kind is pl.String]
-        split = pl.any_horizontal(pl.col(*texts).str.contains(line)).fill_null(value=False)
+        split = pl.any_horizontal(pl.col(*texts).str.contains(line))
+        wrong |= split.fill_null(value=False)
     done = 0
     empty: int | None = None
     try:
@@ -125,18 +126,14 @@ def _batches(
             schema=schema,
             missing_columns="insert",
             glob=False,
-        ).select(
-            *(taken[name] for name in columns), pl.col(_EXCESS).is_not_null(), split.alias(_SPLIT)
-        )
+        ).select(*(taken[name] for name in columns), wrong.alias(_EXCESS))
         for frame in scan.collect_batches(chunk_size=_FRAME_ROWS):
-            for name, wrong in (
-                (_EXCESS, f"has more cells than the header's {len(dialect.schema)}"),
-                (_SPLIT, "goes on behind its line, for its quotes stay open"),
-            ):
-                # in place: `drop` would queue behind the parsing of the next rows
-                if (found := frame.drop_in_place(name)).any():
-                    row = done + (found.arg_max() or 0) + 1
-                    raise LogError(f"row {row} {wrong}; mend that row")
+            # in place: `drop` would queue behind the parsing of the next rows
+            if (found := frame.drop_in_place(_EXCESS)).any():
+                raise LogError(
+                    f"row {done + (found.arg_max() or 0) + 1} has more cells than the header's "
+                    f"{len(dialect.schema)}, or quotes that stay open; mend that row"
+                )
             done += frame.height
             valued = ~pl.all_horizontal(pl.all().is_null())
             if lost := frame.height - frame.select(valued.sum()).item():

@@ -6,15 +6,20 @@ A record has the number of the message's structure, and behind it the message's 
 from __future__ import annotations
 
 import json
+import re
 import struct
+from contextlib import suppress
 from itertools import count
 from typing import Any
 
 from algid.base.limits import LIMITS
 from algid.base.text import repeated
-from algid.readers.annotations import BAD, GOOD, GROUPS
+from algid.readers.annotations import BAD, GOOD, GROUPS, object_in
 from algid.readers.messages.layout import MessageLayout, MisfitError
 from algid.readers.messages.message_file import Messages
+
+_LEVEL = re.compile(r"\b(?:properties|items)\.")
+"""What a schema's levels are called."""
 
 
 class JsonRecords:
@@ -56,12 +61,11 @@ class JsonRecords:
     def _record(self, payload: bytes) -> bytes:
         try:
             content = json.loads(payload, object_pairs_hook=_unique, parse_int=float)
+            leaves = _gather(content, "", {})
         except (ValueError, RecursionError) as error:
             raise MisfitError(f"a message that is no JSON ({type(error).__name__})") from error
         if not isinstance(content, dict):
             raise MisfitError("a JSON message that is no object")
-        leaves: dict[str, Any] = {}
-        _gather(content, "", leaves, 0)
         numbers = {
             path: leaf
             for path, leaf in leaves.items()
@@ -89,6 +93,17 @@ class JsonRecords:
         return struct.pack(f"<Q{len(numbers)}d", self._known[structure], *numbers.values())
 
 
+def properties(schema: str) -> dict[str, str]:
+    """What a JSON schema says of its properties, by their path: ``state.effort.unit``.
+
+    A list's unit may stand at its items.
+    """
+    with suppress(RecursionError):
+        leaves = _gather(object_in(schema), "", {})
+        return {_LEVEL.sub("", path): str(leaf) for path, leaf in leaves.items()}
+    return {}
+
+
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """An object whose names stand there once: of two alike the parser takes the last."""
     found = dict(pairs)
@@ -98,15 +113,14 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _gather(value: Any, path: str, leaves: dict[str, Any], depth: int) -> None:
+def _gather(value: Any, path: str, leaves: dict[str, Any]) -> dict[str, Any]:
     """Add to `leaves` by path what is no object or list; a list of texts is one too."""
-    if depth > LIMITS.definition_depth:
-        raise MisfitError("a JSON message nested too deep")
     if isinstance(value, dict):
         for key, inner in value.items():
-            _gather(inner, f"{path}.{key}" if path else key, leaves, depth + 1)
+            _gather(inner, f"{path}.{key}" if path else key, leaves)
     elif isinstance(value, list) and not (value and all(isinstance(one, str) for one in value)):
         for index, inner in enumerate(value):
-            _gather(inner, f"{path}[{index}]", leaves, depth + 1)
+            _gather(inner, f"{path}[{index}]", leaves)
     else:
         leaves[path] = tuple(value) if isinstance(value, list) else value
+    return leaves

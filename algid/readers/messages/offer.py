@@ -13,9 +13,10 @@ from algid.base.limits import LIMITS
 from algid.base.text import repeated
 from algid.notices import Notice, Remedy
 from algid.profile import Profile
-from algid.readers.annotations import in_json_schema, lines_of, units_in
+from algid.readers.annotations import lines_of, units_in
 from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.column_names import STEMS, ChannelChoice, choose
+from algid.readers.messages import json
 from algid.readers.messages.layout import Decoder, MessageLayout
 from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import codec_for, topic_tables
@@ -186,9 +187,9 @@ def _stated_of(
     text = channel.definition.decode("utf-8", errors="replace")
     metadata, lines = dict(channel.metadata), list(lines_of(channel.metadata))
     if channel.encoding == "json":
-        own, descriptions = in_json_schema(text)
+        own = json.properties(text)
         metadata |= own
-        lines += descriptions
+        lines += [f"{key}: {said}" for key, said in own.items() if key.endswith("description")]
         labels = layouts[0].labels.items()
         lines += [f"{path}: {label}" for path, label in labels if "unit" in path]
     elif channel.definition_encoding.startswith("ros"):
