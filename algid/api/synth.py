@@ -84,9 +84,8 @@ def synthesise(
     *,
     duration: Annotated[float, within(PHYSICAL.duration)] | None = None,
     rate: Annotated[float, within(PHYSICAL.rate)] = 1000.0,
-    torque: Annotated[
-        str | Path | Log, Option(kind=str, suggested=lambda: run.EXCITATIONS)
-    ] = "case",
+    torque: Annotated[str | Path | Log, Option(kind=str, suggested=lambda: run.EXCITATIONS)]
+    | None = None,
     motion: str | Path | None = None,
     torque_hold: Literal["exact", "zoh", "foh"] = "exact",
     initial: State | None = None,
@@ -196,7 +195,7 @@ def synthesise(
         measured = replace(sensors or Sensors(), **of_sensors)
         start: Any = initial or run.Acquisition.initial
         recording = run.Acquisition(rate, duration, start, measured)
-        drive = plan or _drive(arm, torque, torque_hold, recording)
+        drive = plan or _drive(arm, "case" if torque is None else torque, torque_hold, recording)
         names = [f"{arm.name}-unloaded", f"{arm.name}-loaded"][: 1 + bool(arm.payload)]
         if payload_schedule is not None:
             names = [f"{arm.name}-schedule"]
@@ -227,7 +226,7 @@ def _drive(case: Case, given: str | Path | Log, hold: Any, recording: run.Acquis
     if not isinstance(given, Log):
         from algid.readers import read_log
 
-        if not str(given) or not Path(str(given)).exists():
+        if not str(given) or not Path(given).exists():
             raise SettingError(
                 f"{flag('torque')} {given}: expected {', '.join(run.EXCITATIONS)} or a log, found "
                 "neither"

@@ -69,9 +69,7 @@ def counted(count: int, one: str, many: str = "") -> str:
     many : str
         The words for none or several; without them, those for one with an s.
     """
-    if count == 1:
-        return f"{count:,} {one}"
-    return f"{count:,} {many or one + 's'}"
+    return f"{count:,} {one if count == 1 else many or one + 's'}"
 
 
 def repeated(names: Iterable[str]) -> list[str]:

@@ -86,9 +86,9 @@ def command(name: str) -> Command:
     every, text = options_of(verb).values(), "Any other setting, as tau1.sign=-1; may be repeated."
     by_set = [one for one in every if one.by_set]
     taken = [one for one in every if not one.by_set]
-    tops = {one.name.partition(".")[0]: one for one in every}
-    settable = [top for top, one in tops.items() if one.by_set or top not in parameters]
-    several = [one.name for one in parameters.values() if one.kind is one.VAR_POSITIONAL]
+    tops = [one.name.partition(".")[0] for one in every if one.by_set or one.name not in parameters]
+    settable = dict.fromkeys(tops)
+    arguments = [one.name for one in taken if one.panel == ARGUMENTS]
     if by_set:
         lines = [f"{one.name}={word}" for one in by_set for word in one.words or [""]]
         if "options" not in parameters:
@@ -115,8 +115,8 @@ def command(name: str) -> Command:
             line = shlex.join(["algid", *sys.argv[1:]])
             callers = {"command": line, "complain": complain, "progress": bar}
             called = {key: value for key, value in callers.items() if key in parameters}
-            called |= {key: value for key, value in given.items() if key not in several}
-            value = verb(*[given[key] for key in several], **called)
+            called |= {key: value for key, value in given.items() if key not in arguments}
+            value = verb(*map(given.get, arguments), **called)
         answers = value  # of a report
         if hasattr(module, "answer"):
             answers = [module.answer(value, given | {"verbose": verbose})]
