@@ -306,13 +306,11 @@ def samples(
     left = {name: sums[source] for name, source in sources.items() if source in sums}
     count = lost = done = 0
     cut_off = False
-    for arrays in cell_batches(table, cells, list(sources.values())):
-        import pyarrow as pa
-
-        whole = batch = pa.RecordBatch.from_arrays(arrays, names=list(sources))
-        cut_off = any(len(values) and not values[-1].is_valid for values in arrays)
-        if any(values.null_count for values in arrays):  # it imports what plain rows do without
-            whole = batch.drop_null()
+    for batch in cell_batches(table, cells, sources):
+        whole = batch
+        cut_off = any(len(values) and not values[-1].is_valid for values in batch.columns)
+        if any(values.null_count for values in batch.columns):
+            whole = batch.drop_null()  # it imports what plain rows do without
         count += batch.num_rows
         lost += batch.num_rows - whole.num_rows
         channels = {name: whole_column(whole.column(name)) for name in sources}

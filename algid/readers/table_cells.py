@@ -137,15 +137,15 @@ class Cell:
 
 
 def cell_batches(
-    table: TableFile, cells: Mapping[str, Cell], names: Sequence[str]
-) -> Iterator[list[pa.Array]]:
-    """Some cells of each batch of rows: integers, floats, or for a clock ticks of its type.
+    table: TableFile, cells: Mapping[str, Cell], sources: Mapping[str, str]
+) -> Iterator[pa.RecordBatch]:
+    """Some cells of each batch of rows, by channel: integers, floats, or for a clock its ticks.
 
     Of rows that a flag takes out each is null.
     """
     import pyarrow as pa
 
-    chosen = [cells[name] for name in names]
+    chosen = [cells[source] for source in sources.values()]
     columns = [column for one in chosen for column in one.columns]
     bad, made = list[Any](), list[Any]()
     for name in [one for one in cells if one.lower() in GOOD or one.lower() in BAD]:
@@ -170,7 +170,7 @@ def cell_batches(
             if one.is_clock:
                 ticks = pa.int32() if one.type.bit_width == 32 else pa.int64()
                 arrays[place] = arrays[place].cast(one.type).view(ticks)
-        yield arrays
+        yield pa.RecordBatch.from_arrays(arrays, names=[*sources])
 
 
 def cells_of(table: TableFile) -> dict[str, Cell]:

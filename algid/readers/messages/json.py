@@ -1,6 +1,6 @@
 """JSON messages, rewritten as records: their numbers stand at no fixed place.
 
-A record has the number of the message's structure, and behind it the message's numbers as float64.
+A record has a hash of the message's structure, and behind it the message's numbers as float64.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import json
 import re
 import struct
 from contextlib import suppress
-from itertools import count
 from typing import Any
 
 from algid.base.limits import LIMITS
@@ -26,15 +25,12 @@ class JsonRecords:
     """The structures of a topic's messages: what they name, and the order of their numbers."""
 
     def __init__(self) -> None:
-        self._known: dict[object, int] = {}
         self._layouts: dict[int, MessageLayout] = {}
-        self._numbers = count()
         self._misfit = ""
 
     def records(self, messages: Messages) -> Messages:
         """The messages as records, which `parse` reads until the next ones are made."""
         if len(self._layouts) > LIMITS.layouts:  # what is remembered must not grow with the file
-            self._known.clear()
             self._layouts.clear()
         rows = []
         for start, size in zip(messages.starts, messages.sizes, strict=True):
@@ -56,7 +52,7 @@ class JsonRecords:
         """
         if not record:
             raise MisfitError(self._misfit)
-        return self._layouts[struct.unpack_from("<Q", record)[0]]
+        return self._layouts[struct.unpack_from("<q", record)[0]]
 
     def _record(self, payload: bytes) -> bytes:
         try:
@@ -72,15 +68,15 @@ class JsonRecords:
             if type(leaf) is float or (type(leaf) is bool and path in GOOD | BAD)
         }
         # what changes with every message is no structure: of very many groups a few are enough
-        groups = GROUPS if len(self._known) < LIMITS.layouts else ()
+        groups = GROUPS if len(self._layouts) < LIMITS.layouts else ()
         told = {
             path: leaf
             for path, leaf in leaves.items()
             if type(leaf) is tuple or path.rpartition(".")[2] in groups
         }
-        structure = tuple(numbers), tuple(told.items())
-        if structure not in self._known:
-            layout = MessageLayout(fixed=[(0, 8)])
+        structure = hash((tuple(numbers), tuple(told.items())))
+        if structure not in self._layouts:
+            layout = self._layouts[structure] = MessageLayout(fixed=[(0, 8)])
             for place, path in enumerate(numbers, start=1):
                 layout.add(path, 8 * place, "<f8")
             for path, leaf in leaves.items():
@@ -88,9 +84,7 @@ class JsonRecords:
                     layout.texts[path] = leaf
                 elif type(leaf) is str or path in told:
                     layout.labels[path] = str(leaf)
-            self._known[structure] = next(self._numbers)
-            self._layouts[self._known[structure]] = layout
-        return struct.pack(f"<Q{len(numbers)}d", self._known[structure], *numbers.values())
+        return struct.pack(f"<q{len(numbers)}d", structure, *numbers.values())
 
 
 def properties(schema: str) -> dict[str, str]:

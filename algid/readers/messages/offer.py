@@ -229,7 +229,7 @@ def _find_joint_topic(
         If none holds two joints, several do, or one holds more and none was selected.
     """
     fitting: dict[str, tuple[dict[str, TopicField], ChannelChoice]] = {}
-    refused, lacking = list[str](), list[str]()
+    refused, lacking = list[str](), dict[str, str]()
     needed = [name for name in profile.needed if name not in given]
     choose_two = Remedy({"joints": None}, "choose two")
     by_place = Remedy({"theta1.source": None}, "or name each field")
@@ -239,25 +239,21 @@ def _find_joint_topic(
         known |= channel.encoding == "json" or any(map(channel.definition.__contains__, _TELLING))
         if name != profile.topic and (profile.topic or not known):
             continue
-        why = held = ""
         try:
             for layout in layouts_of(file, name):
                 try:
                     fields = fields_in(name, layout)
                     choice = _choice(fields, profile, given)
                 except LookupError as error:
-                    why = f"{name!r}: {error}; {choose_two}; {by_place} …"
+                    refused.insert(0, f"{name!r}: {error}; {choose_two}; {by_place} …")
                     continue
                 if choice.columns.keys() >= set(needed):
                     fitting[name] = fields, choice
                     break
                 if names_in(layout):
-                    held = f"{name!r} with {', '.join([*_paths(layout)][:12])}"
+                    lacking[name] = f"{name!r} with {', '.join([*_paths(layout)][:12])}"
         except LogError as error:  # another topic may still hold the joints
             refused.append(str(error))
-        if name not in fitting:
-            refused[:0] = [why] if why else []
-            lacking += [held] if held else []
     if _USUAL in fitting or len(fitting) == 1:
         topic = _USUAL if _USUAL in fitting else next(iter(fitting))
         return topic, *fitting.pop(topic), list(fitting)
@@ -270,7 +266,7 @@ def _find_joint_topic(
     wanted = f"the joints {profile.joints}" if profile.joints else "two joints"
     both = Remedy({"topic": None, "joints": None})
     each = Remedy({"tau1.topic": None, "tau1.source": None}, "or channel by channel")
-    held = "; ".join(lacking[:4]) or file.listed()
+    held = "; ".join([*lacking.values()][:4]) or file.listed()
     text = f"no topic holds {', '.join(needed)} of {wanted}; found {held}"
     raise LogError(file.lacking(f"{text}; name topics and fields: {both}; {each}"))
 
