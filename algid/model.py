@@ -567,7 +567,8 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
         return J
     place, loads = model.compiled.place, list(model.compiled.loads)
     for share, whole in of_motors(model):
-        J[:, whole] += c[share] / c[whole] * J[:, share]
+        if c[whole]:  # of nothing no motor has a share
+            J[:, whole] += c[share] / c[whole] * J[:, share]
     factor = gains(model, c)
     for name, joint in attributes(model, "gains"):
         J[joint, place[name]] = _torques(J[joint], c) / factor[joint]

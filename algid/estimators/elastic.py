@@ -109,6 +109,8 @@ def turns(
         return
     beside = {at: J[:, at] for at in set(range(len(model.names))).difference(inertial(model))}
     for share, whole in of_motors(model):
+        if c[whole] == 0:  # of nothing no motor has a share
+            continue
         of_rotor = J[:, whole] + (1 - c[share]) / c[whole] * J[:, share]
         beside |= {share: c[whole] * of_rotor, whole: c[share] * of_rotor}
     for at, column in beside.items():

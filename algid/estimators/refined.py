@@ -147,8 +147,11 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
         for log in tested:
             log.smooth, log.by_motion = True, not attributes(shared.model, "elastic")
         at = {log.loaded: shared.coefficients(fitted.values, log.loaded) for log in tested}
-        products = Products(tested, shared, at, problem.settings.shift.delay, shapes)
-        p_value = misfit(fitted, products, prior)
+        try:
+            products = Products(tested, shared, at, problem.settings.shift.delay, shapes)
+            p_value = misfit(fitted, products, prior)
+        except np.linalg.LinAlgError:  # of joints that never move
+            return given_up("not converged")
         if p_value < level("REFUTED"):
             return replace(given_up("motion", p_value=p_value), products=products)
         fitted = replace(fitted, products=products)

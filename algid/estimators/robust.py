@@ -466,7 +466,8 @@ def expectation(
                 unit = float(torque[int(name.endswith("2"))])
             elif spread.of == "cosine":
                 unit = value[SINES[name]]
-            found.append((name, term, mean, spread.size * unit, spread.usual))
+            # of an arm that shows no inertia none, in a number whose square has an inverse
+            found.append((name, term, mean, spread.size * max(unit, 1e-100), spread.usual))
     names, terms, *numbers = zip(*found, strict=True) if found else [()] * 5
     return Expected(names, terms, *map(np.array, numbers))
 

@@ -208,8 +208,10 @@ def cells_of(table: TableFile) -> dict[str, Cell]:
             for joint in joints[: LIMITS.joints]:
                 called = _lists(_whole(label), table.schema.field(label).type)
                 mine = called.eval(pl.element() == joint).list
-                at = pl.when(mine.any()).then(mine.arg_max())
-                number = _lists(_whole(one.name), one.type).get(at, null_on_oob=True)
+                numbers = _lists(_whole(one.name), one.type)
+                alike = numbers.len() == called.len()
+                at = pl.when(mine.any() & alike).then(mine.arg_max())
+                number = numbers.get(at, null_on_oob=True)
                 cell = Cell((one.name, label), one.type.value_type, number, joint)
                 cells[f"/{label}/{joint}/{one.name}"] = _marked(cell, said)
             continue

@@ -105,3 +105,12 @@ def test_a_spike_in_a_torque_overflows_nothing() -> None:
     t, theta, tau = moving(100, 10)
     tau[1, 333] += 1e29
     assert identify(log_of(t, theta, tau), report=False).parameters
+
+
+@pytest.mark.parametrize("place", [(0.0, None), (0.0, 0.0)])
+def test_joints_that_never_move_are_no_fault(place: tuple[float, float | None]) -> None:
+    t, theta, tau = moving(200, 4)
+    tau += np.random.default_rng(1).normal(scale=5e-3, size=tau.shape)
+    for joint, angle in enumerate(place):
+        theta[joint] = theta[joint] if angle is None else angle
+    assert identify(log_of(t, theta, tau), report=False).verdict.grade == "failed"

@@ -531,6 +531,12 @@ FACTS = (
         within=1e-8,
     ),
     Fact(
+        "a torque more than names, from midway on",
+        states=messages(~FIRST_HALF, effort=np.vstack([0.3 * np.ones(N), TA])),
+        keep=FIRST_HALF,
+        within=1e-8,
+    ),
+    Fact(
         "joints renamed midway (a,b then c,d)",
         states=either(FIRST_HALF, messages(name=("a", "b")), messages(name=("c", "d"))),
         keep=FIRST_HALF,

@@ -79,4 +79,6 @@ def test_a_torque_beside_one_of_zeros_is_taken_by_its_topic_and_field(tmp_path: 
     zeros = [one.remedies[0].settings for one in found if one.code == "EFFORT_ZERO"]
     assert zeros == [{"tau1.source": None}, {"tau2.source": None}]
     named = {"tau1": {"topic": "/ft", "source": "wrench.torque.z"}}
-    assert np.array_equal(read_log(path, Profile.model_validate(named)).tau[0], LOG.tau[0])
+    log = read_log(path, Profile.model_validate(named))
+    assert np.array_equal(log.tau[0], LOG.tau[0])
+    assert log.origin.reading.clock == "log"  # which both topics have

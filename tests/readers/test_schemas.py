@@ -5,6 +5,7 @@ much.
 from __future__ import annotations
 
 import json
+import struct
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from algid.readers.messages.layout import Codec, Decoder, MisfitError
 from algid.readers.messages.message_file import Messages
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import (
+    ANY,
     TOPIC,
     messages_of,
     protobuf_file,
@@ -45,7 +47,7 @@ def changed_json(folder: Path, row: int, change: Callable[[Any], object]) -> Pat
 @pytest.mark.parametrize("digits", [20, 400])
 def test_json_integers_beyond_64_bits_are_no_traceback(digits: int, tmp_path: Path) -> None:
     number = int("9" * digits)
-    path = changed_json(tmp_path, 7, lambda one: one["position"].insert(0, number))
+    path = changed_json(tmp_path, 7, lambda one: one["position"].__setitem__(0, number))
     if digits > 308:
         with pytest.raises(LogError, match=r"theta1 .* sample 8: expected a finite number"):
             read_log(path)
@@ -71,6 +73,81 @@ def test_a_joint_named_twice_is_refused_and_read_by_its_place(
         read_log(path)
     if name == "a1":
         assert same(read_log(path, named("position[0] position[1] effort[0] effort[1]")), LOG)
+
+
+STRUCTURES = """Arm arm
+================
+MSG: arm/Arm
+builtin_interfaces/Time stamp
+Joint[] joints
+================
+MSG: arm/Joint
+wstring name
+float64 position
+float64 effort
+================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+
+
+@pytest.mark.parametrize("encoding", ["cdr", "json", "protobuf"])
+def test_structures_in_any_order_are_known_by_their_names_and_have_their_own_stamp(
+    encoding: str, tmp_path: Path
+) -> None:
+    """Of protobuf a map, whose entries come in any order, beside the recorder's stamps."""
+    file = protobuf_file(("position", 1, 1), ("effort", 1, 1), name="Joint")
+    state = file.message_type.add(name="State")
+    entry = state.nested_type.add(name="JointsEntry")
+    entry.options.map_entry = True
+    entry.field.add(name="key", number=1, type=9, label=1)
+    entry.field.add(name="value", number=2, type=11, label=1, type_name=".arm.Joint")
+    state.field.add(name="joints", number=1, type=11, label=3, type_name=".arm.State.JointsEntry")
+    schema, made = protobuf_types(file)
+    known = {"cdr": ("arm/msg/State", "ros2msg", STRUCTURES.encode()), "json": ANY}
+    messages = []
+    for row, stamp in enumerate(LOG.stamp_ns.tolist()):
+        sec, nanosec = divmod(stamp, 10**9)
+        joints = [("j1", *sample(0, row)), ("j2", *sample(1, row))][:: -1 if row % 3 else 1]
+        if encoding == "json":
+            own = [dict(zip(("name", "position", "effort"), one, strict=True)) for one in joints]
+            arm = {"stamp": {"sec": sec, "nanosec": nanosec}, "joints": own}
+            data = json.dumps({"arm": arm}).encode()
+        elif encoding == "cdr":
+            data = struct.pack("<iII", sec, nanosec, len(joints))
+            for name, *values in joints:
+                data += struct.pack("<III", 2, *map(ord, name))
+                data += bytes(-len(data) % 8) + struct.pack("<dd", *values)
+            data = b"\0\1\0\0" + data
+        else:
+            parts = []
+            for name, position, effort in joints:
+                parts.append(made(joints={name: {"position": position, "effort": effort}}))
+            data = b"".join(part.SerializeToString() for part in parts)
+        messages.append(("/arm", stamp if encoding == "protobuf" else stamp + 7, data))
+    path = tmp_path / "log.mcap"
+    write_mcap(path, messages, known.get(encoding, ("arm.State", "protobuf", schema)))
+    assert same(read_log(path), LOG)
+
+
+def sample(joint: int, row: int) -> tuple[float, float]:
+    """Angle and torque of a joint in a row of the log."""
+    return float(LOG.theta[joint, row]), float(LOG.tau[joint, row])
+
+
+def test_a_unit_in_a_comment_of_protobuf_is_told(tmp_path: Path) -> None:
+    data, kind = protobuf_schema()
+    schema = descriptor_pb2.FileDescriptorSet.FromString(data)
+    schema.file[1].source_code_info.location.add(leading_comments=" motor current [A]\n")
+    messages = []
+    for one in sent(LOG):
+        message = kind(name=one.name, position=one.position, effort=one.effort)
+        messages.append((TOPIC, one.stamp, message.SerializeToString()))
+    known = {TOPIC: ("arm.State", "protobuf", schema.SerializeToString())}
+    log = read_log(write_mcap(tmp_path / "log.mcap", messages, known))
+    (notice,) = (one for one in log.notices if one.code == "STATED_UNUSED")
+    assert "motor current [A]" in notice.text
 
 
 ARM = ("theta1", "theta2", "tau1", "tau2")

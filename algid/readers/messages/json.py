@@ -13,8 +13,8 @@ from typing import Any
 
 from algid.base.limits import LIMITS
 from algid.base.text import repeated
-from algid.readers.annotations import BAD, GOOD, GROUPS, object_in
-from algid.readers.messages.layout import MessageLayout, MisfitError
+from algid.readers.annotations import BAD, GOOD, object_in
+from algid.readers.messages.layout import MessageLayout, MisfitError, tells
 from algid.readers.messages.message_file import Messages
 
 _LEVEL = re.compile(r"\b(?:properties|items)\.")
@@ -68,12 +68,12 @@ class JsonRecords:
             if type(leaf) is float or (type(leaf) is bool and path in GOOD | BAD)
         }
         # what changes with every message is no structure: of very many groups a few are enough
-        groups = GROUPS if len(self._layouts) < LIMITS.layouts else ()
-        told = {
-            path: leaf
-            for path, leaf in leaves.items()
-            if type(leaf) is tuple or path.rpartition(".")[2] in groups
-        }
+        few = len(self._layouts) < LIMITS.layouts
+        told = {}
+        for path, leaf in leaves.items():
+            missing = leaf is None and path.endswith("]")  # it has a place in its list
+            if type(leaf) is tuple or missing or (few and tells(path)):
+                told[path] = leaf
         structure = hash((tuple(numbers), tuple(told.items())))
         if structure not in self._layouts:
             layout = self._layouts[structure] = MessageLayout(fixed=[(0, 8)])
@@ -83,7 +83,7 @@ class JsonRecords:
                 if type(leaf) is tuple:
                     layout.texts[path] = leaf
                 elif type(leaf) is str or path in told:
-                    layout.labels[path] = str(leaf)
+                    layout.label(path, str(leaf))
         return struct.pack(f"<q{len(numbers)}d", structure, *numbers.values())
 
 

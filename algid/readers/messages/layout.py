@@ -21,9 +21,13 @@ from algid.base.names import concatenated, rows_of
 from algid.base.text import counted
 from algid.readers.annotations import BAD, GOOD, GROUPS
 from algid.readers.messages.message_file import Messages, gather
+from algid.readers.table_cells import LABELS
 
-_PLACE = r"([^.\[\]]+)\[(\d{1,9})\](.*)"
-"""A list of a structure, the place of one of its numbers, and where that number lies there."""
+NAMES = (*LABELS, "key")
+"""What a list of the joints' names is called, and a structure's or a map's entry's own name."""
+_NAMED = re.compile(rf"(.*)\[(\d{{1,9}})\]\.({'|'.join(NAMES)})")
+_PLACE = r"\[(\d{1,9})\](.*)"
+"""The place of one of a list's numbers, and where that number lies there."""
 
 
 class MisfitError(Exception):
@@ -52,7 +56,7 @@ class MessageLayout:
     texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
     fixed: list[tuple[int, int]] = field(default_factory=list)
     labels: dict[str, str] = field(default_factory=dict)
-    """Single texts that name an arm or a recording, of a JSON message a unit, too."""
+    """Single texts of which `tells` is true, of a JSON message all, and its nulls in lists."""
     empty: list[str] = field(default_factory=list)
     """Lists of no numbers."""
     flags: list[int] = field(default_factory=list)
@@ -74,20 +78,35 @@ class MessageLayout:
         for place in range(min(count, LIMITS.columns)):
             self.numbers[f"{path}[{place}]"] = Number(offset + place * width, kind, width)
 
+    def label(self, path: str, text: str) -> None:
+        """Note a single text; what the structures of a list are called is a list of names, too."""
+        self.labels[path] = text
+        if text and (own := _NAMED.fullmatch(path)):
+            names = self.texts.get(at := f"{own[1]}[].{own[3]}", ())
+            if len(names) == int(own[2]) < LIMITS.joints:
+                self.texts[at] = (*names, text)
+
     @cached_property
     def named(self) -> dict[str, str]:
         """By path in which names stand for places (``position[elbow]``) that of the number.
 
-        The names are those of a list of texts beside the list.
+        The names are those of a list of texts beside the list and as long as that, or of the
+        list's structures (``joints[elbow].position``).
         """
         named = dict[str, str]()
         # what lies within a list has names of its own first: interface_values[elbow].values[effort]
         for at, texts in sorted(self.texts.items(), key=lambda one: -one[0].count(".")):
-            beside = re.compile(re.escape(at[: at.rfind(".") + 1]) + _PLACE)
+            own, sizes = re.escape(at[: at.rfind(".") + 1]) + r"[^.\[\]]+", dict[str, int]()
+            if at.rpartition(".")[0].endswith("[]"):
+                own = re.escape(at.rpartition("[].")[0])
+            beside = re.compile(f"({own}){_PLACE}")
+            for one in filter(None, map(beside.fullmatch, [*self.numbers, *self.labels])):
+                if not one[3]:
+                    sizes[one[1]] = max(sizes.get(one[1], 0), int(one[2]) + 1)
             for path, place in [*zip(self.numbers, self.numbers, strict=True), *named.items()]:
                 match = beside.fullmatch(path)
                 name = texts[int(match[2])] if match and int(match[2]) < len(texts) else None
-                if match and texts.count(name) == 1:
+                if match and texts.count(name) == 1 and sizes.get(match[1]) in (None, len(texts)):
                     named[f"{path[: match.start(2)]}{name}{path[match.end(2) :]}"] = place
         return named
 
@@ -109,6 +128,11 @@ class MessageLayout:
         if joints and joints.isdisjoint(named) and (named or lists.isdisjoint(held)):
             return []
         return [path for path in wanted if self.find(path) is None]
+
+
+def tells(path: str) -> bool:
+    """True for the place of a text that names an arm, a recording, or a structure of a list."""
+    return path.rpartition(".")[2] in GROUPS or bool(_NAMED.fullmatch(path))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, product
 
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
@@ -16,8 +16,8 @@ from algid.profile import Profile
 from algid.readers.annotations import lines_of, units_in
 from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.column_names import STEMS, ChannelChoice, choose
-from algid.readers.messages import json
-from algid.readers.messages.layout import Decoder, MessageLayout
+from algid.readers.messages import json, protobuf
+from algid.readers.messages.layout import NAMES, Decoder, MessageLayout
 from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import codec_for, topic_tables
 from algid.readers.table import (
@@ -28,14 +28,14 @@ from algid.readers.table import (
     TopicField,
     in_pairs,
 )
-from algid.readers.table_cells import LABELS
 
 _SAMPLES = 64
 TOPIC = Remedy({"topic": None})
 _USUAL = "/joint_states"
 _STEMS = frozenset(chain.from_iterable(STEMS.values()))
-_BESIDE_NAMES = re.compile(r"(?:interface_values\[([^\]]*)\]\.values|(\w+))\[([^\]]*)\]")
-"""Numbers of a joint, or of one of a DynamicJointState, by its name."""
+_INDEXED = re.compile(r"(\w+)\[([^\]]*)\](?=(.*))")
+"""A list, a place or name within it, and what follows."""
+_WORD, _VALUES = re.compile(r"\w+"), ("value", "values")
 _TELLING = (b"effort", b"tau_est", b"tau_J")
 """Names of torques in definitions: of ROS, Unitree, libfranka."""
 _JOINT_REFERENCES = "/joint_references"
@@ -108,13 +108,24 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
                 raise LogError(file.lacking(f"{text}; name another: {other}"))
         stamps[home] = None
         if profile.clock != "log":
-            stamps[home] = next(filter(None, map(stamp_in, layouts)), None)
+            around = next(iter(wanted.values())).partition("[")[0].rpartition(".")[0]
+            stamps[home] = next(filter(None, (stamp_in(one, around) for one in layouts)), None)
         if profile.clock == "header" and stamps[home] is None:
             log_clock = Remedy({"clock": "log"})
             raise LogError(f"messages on {home!r} carry no stamp: {log_clock}")
         stated, lines = _stated_of(file, home, paths, layouts)
         units |= stated
         said += lines
+    # topics have one clock: the recorder's where one of them has no stamps that move
+    sampled = {fields[one].topic for name, one in chosen.items() if name not in REFERENCES}
+    if len(sampled) > 1 and profile.clock is None:
+        still = list[Notice]()
+        for home in sampled:
+            if own_stamp := stamps[home]:
+                next(topic_tables(log.files, home, {}, own_stamp, None, still), None)
+        if still or None in map(stamps.get, sampled):
+            stamps = dict.fromkeys(stamps)
+        notices += still
     # the main topic has the clock
     main, stamp = next(iter(stamps.items()))
     chosen["t"], time = "log time", TopicField("", is_clock=True)
@@ -194,6 +205,8 @@ def _stated_of(
         lines += [f"{path}: {label}" for path, label in labels if "unit" in path]
     elif channel.definition_encoding.startswith("ros"):
         lines += [line for line in text.splitlines() if "#" in line or "//" in line]
+    elif channel.encoding == "protobuf":
+        lines += protobuf.comments(channel.definition)
     lists = {name: path.partition("[")[0] for name, path in paths.items()}
     units = units_in(metadata, list(dict.fromkeys(lists.values())))
     return {name: units[path] for name, path in lists.items() if path in units}, lines
@@ -290,36 +303,49 @@ def fields_in(topic: str, layout: MessageLayout) -> dict[str, TopicField]:
     LookupError
         If a joint is named twice.
     """
-    names, fields = names_in(layout), dict[str, TopicField]()
-    if twice := repeated(names):
-        raise LookupError(f"its messages name the joint {twice[0]!r} twice")
+    joints, fields, twice = set[str](), dict[str, TopicField](), list[str]()
+    for at, names in layout.texts.items():
+        if at.rpartition(".")[2] in NAMES:
+            joints |= set(names[: LIMITS.joints])
+            twice += repeated(names)
     called = {place: path for path, place in layout.named.items()}
     for place in layout.numbers:
-        path = called.get(place, place)
-        fields[place] = TopicField(place, topic)
-        if match := _BESIDE_NAMES.fullmatch(path):
-            joint, stem = (match[1], match[3]) if match[1] else (match[3], match[2])
-            if joint in names and stem in _STEMS:
-                del fields[place]
-                fields[f"{topic}/{joint}/{stem}"] = TopicField(path, topic, joint)
+        name, joint, path = place, "", called.get(place, place)
+        for match in _INDEXED.finditer(path if place in called else ""):
+            # of a structure's field, of an interface of a DynamicJointState, or of a list
+            word = "_".join(one for one in _WORD.findall(match[3]) if one not in _VALUES)
+            if match[2] in joints and (match[3] or match[1] in _STEMS):
+                joint = match[2]
+                name = f"{topic}/{joint}/{word or match[1]}"
+                twice += [joint] * (name in fields)
+        fields[name] = TopicField(path if joint else place, topic, joint)
+    if twice:
+        raise LookupError(f"its messages name the joint {twice[0]!r} twice")
     return fields
 
 
 def names_in(layout: MessageLayout) -> tuple[str, ...]:
     """The joints that a message of this layout names."""
     for path, texts in layout.texts.items():
-        if path in LABELS:
+        if path.rpartition(".")[2] in NAMES:
             return texts[: LIMITS.joints]
     return ()
 
 
-def stamp_in(layout: MessageLayout) -> tuple[str, str] | None:
-    """Where messages of this layout carry their own stamp: its seconds and nanoseconds."""
-    for base in _STAMPS:
-        for seconds, nanoseconds in _PARTS:
+def stamp_in(layout: MessageLayout, around: str) -> tuple[str, str] | None:
+    """Where messages of this layout carry their own stamp: its seconds and nanoseconds.
+
+    It is that of the structure `around` the numbers, or else of one that has it within.
+    """
+    for _ in range(LIMITS.definition_depth):
+        for base, (seconds, nanoseconds) in product(_STAMPS, _PARTS):
+            base = f"{around}.{base}".lstrip(".")
             pair = (f"{base}.{seconds}", f"{base}.{nanoseconds}")
             if all(map(layout.find, pair)):
                 return pair
+        if not around:
+            break
+        around = around.rpartition(".")[0]
     return None
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from algid.base.limits import LIMITS
-from algid.readers.messages.layout import MessageLayout, MisfitError, Number
+from algid.readers.messages.layout import MessageLayout, MisfitError, Number, tells
 
 _KINDS = {1: "<f8", 2: "<f4", 6: "<u8", 7: "<u4", 15: "<i4", 16: "<i8"}
 _KINDS |= dict.fromkeys((3, 5, 8, 13, 14), "varint") | {4: "unsigned", 17: "zigzag", 18: "zigzag"}
@@ -61,6 +61,17 @@ def parse(root: str, data: bytes) -> Types:
     if f".{root}" not in types:
         raise MisfitError(f"{root}: the type is not defined")
     return types
+
+
+def comments(data: bytes) -> list[str]:
+    """The comments beside the fields of a FileDescriptorSet, where it was made with them."""
+    from google.protobuf.descriptor_pb2 import FileDescriptorSet
+
+    lines = []
+    for file in FileDescriptorSet.FromString(data).file:
+        for place in file.source_code_info.location:
+            lines += f"{place.leading_comments}\n{place.trailing_comments}".splitlines()
+    return list(filter(str.strip, lines))
 
 
 def _entries(data: bytes, start: int, end: int) -> Iterator[tuple[int, int, int, int]]:
@@ -148,10 +159,13 @@ class _Walk:
         elif wire == 2 and own.type == _MESSAGE:
             self.message(first, stop, own.type_name, f"{place}.")
         elif wire == 2 and own.type == _STRING:
-            if repeated:
+            text = self.data[first:stop].decode("utf-8", errors="replace")
+            if repeated or tells(path):
                 self.layout.pin(first, stop)
-                text = self.data[first:stop].decode("utf-8", errors="replace")
+            if repeated:
                 self.layout.texts[path] = (*self.layout.texts.get(path, ()), text)
+            elif tells(path):
+                self.layout.label(path, text)
         elif wire == 0 and kind and not width:
             self.layout.flags.extend(range(first, stop))
             self.layout.numbers[place] = Number(first, kind, stop - first)

@@ -16,8 +16,7 @@ from typing import Any
 
 from algid.base.limits import LIMITS
 from algid.base.text import counted
-from algid.readers.annotations import GROUPS
-from algid.readers.messages.layout import MessageLayout, MisfitError
+from algid.readers.messages.layout import MessageLayout, MisfitError, tells
 
 PRIMITIVES = {
     "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1",
@@ -176,8 +175,8 @@ class _Walk:
                 self.take(size if count is None else count * size)
             elif field.type in TEXTS and count is not None:
                 self.layout.texts[path] = tuple(self.text(field.type) for _ in range(count))
-            elif field.type in TEXTS and field.name in GROUPS:
-                self.layout.labels[path] = self.text(field.type)
+            elif field.type in TEXTS and tells(path):
+                self.layout.label(path, self.text(field.type))
             elif field.type in TEXTS:
                 self.text(field.type, pinned=False)
             else:
@@ -193,10 +192,13 @@ class _Walk:
 
     def text(self, kind: str, *, pinned: bool = True) -> str:
         """The next text; what it says fixes the layout where it is `pinned`."""
-        content = self.take(self.length() * (4 if kind == "wstring" else 1))
+        width, form = 1, "utf-8"
+        if kind == "wstring":
+            width, form = 4, "utf-32-le" if self.order == "<" else "utf-32-be"
+        content = self.take(self.length() * width)
         if pinned:
             self.layout.pin(self.place - len(content), self.place)
-        return content.rstrip(b"\0").decode("utf-8", errors="replace")
+        return content.decode(form, errors="replace").rstrip("\0")
 
     def align(self, size: int) -> None:
         """Pass over the bytes before a number of that size."""
