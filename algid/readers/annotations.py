@@ -211,29 +211,26 @@ def settings_unused(
     profile: Profile, reading: Reading, mapping: Mapping[str, str]
 ) -> Iterator[Notice]:
     """One notice of the settings that a profile has and no step of reading consumed."""
-    if reading.clock == "column":
-        useless = {"topic", "clock"}
-        useless |= {f"{name}.topic" for name in profile.channels if profile.channel(name).topic}
-        if reading.time_unit == "ns" != profile.time_unit:
-            useless.add("time_unit")
-        if not mapping["t"].startswith("rows at"):
-            useless.add("rate")
-        if set(profile.columns or ()).isdisjoint(mapping.values()):
-            useless.add("columns")
-    else:
-        useless = {"time", "time_unit", "rate", "columns"}
-    for pair in (VELOCITIES, REFERENCES):
-        if pair[0] in profile.channels and pair[0] not in mapping:
-            useless |= set(pair)
-            if pair is VELOCITIES and profile.velocity == "measured":
-                useless.add("velocity")
+    by_column = reading.clock == "column"
+    idle = {
+        "topic": by_column,
+        "clock": by_column,
+        "time": not by_column,
+        "time_unit": not by_column or reading.time_unit == "ns" != profile.time_unit,
+        "rate": not mapping["t"].startswith("rows at"),
+        "columns": set(profile.columns or ()).isdisjoint(mapping.values()),
+    }
+    for name in profile.channels:
+        idle[name] = name in (*VELOCITIES, *REFERENCES) and name not in mapping
+        idle[f"{name}.topic"] = by_column and bool(profile.channel(name).topic)
+    idle["velocity"] = idle.get("omega1", False) and profile.velocity == "measured"
     given = set()
     for name in profile.model_fields_set:
         one = getattr(profile, name)
         # a channel's table that is empty, as a drafted profile has it, says nothing
         if one is not None and getattr(one, "model_fields_set", True):
             given.add(name)
-    names = [name for name in useless if name.partition(".")[0] in given]
+    names = [name for name, is_idle in idle.items() if is_idle and name.partition(".")[0] in given]
     if names:
         yield Notice(
             "STATED_UNUSED",

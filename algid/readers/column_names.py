@@ -261,8 +261,8 @@ def choose(
                         f"{column!r} and {twin!r} are both {name.stem} of joint {name.joint}"
                     )
     quantity = "theta" if angles else "tau"
-    columns_of_both = (chosen.get(f"{quantity}1"), chosen.get(f"{quantity}2"))
-    both = [name for column, name in parts.items() if column in columns_of_both]
+    pair = (chosen.get(f"{quantity}1"), chosen.get(f"{quantity}2"))
+    both = [name for column, name in parts.items() if column in pair]
     own = [name.own for name in both]
     if len(set(own)) < len(own):  # /left/arm/q and /right/arm/q
         own = [name.joint or "" for name in both]

@@ -127,8 +127,10 @@ def open_offered(path: str, offered: Offered, profile: Profile) -> TableReader:
     """
     fields = offered.fields
     sources = _sources(offered, profile)
+    mapping = {"t": f"rows at {profile.rate or 0:g} Hz"}
     for name, source in sources.items():
         one = fields[source]
+        mapping[name] = f"{one.topic}: {one.column}" if one.topic else source
         if not (one.is_number or (name == "t" and one.is_clock)):
             held = str(one.type).removeprefix("large_").removesuffix("_view")[:80]
             raise LogError(f"column {source!r} for {name} holds {held}; expected numbers")
@@ -145,10 +147,6 @@ def open_offered(path: str, offered: Offered, profile: Profile) -> TableReader:
     notices += _doubts(offered, sources, units, profile)
     unit = profile.time_unit or unit_of(units.pop("t", ""))
     clock = Clock(unit, unit is not None)
-    mapping = {"t": f"rows at {profile.rate or 0:g} Hz"}
-    for name, source in sources.items():
-        one = fields[source]
-        mapping[name] = f"{one.topic}: {one.column}" if one.topic else source
     if "t" not in sources:  # any column has a cell in each row that is counted
         sources["t"], clock = sources[profile.needed[0]], Clock("ns", True, profile.rate)
     elif fields[sources["t"]].is_clock:

@@ -56,22 +56,19 @@ class FileFormat:
         Ends of file names by which logs are looked for in a folder.
     magic : bytes
         What its files begin with; empty for folders, and for text.
-    messages : bool
-        Whether it holds messages on topics, not columns.
     """
 
     name: str
     title: str
     suffixes: tuple[str, ...]
     magic: bytes
-    messages: bool = False
 
 
 FORMATS: tuple[FileFormat, ...] = (
-    FileFormat("mcap", "MCAP", (".mcap",), b"\x89MCAP0\r\n", messages=True),
-    FileFormat("rosbag2", "rosbag2 folder", (), b"", messages=True),
-    FileFormat("db3", "rosbag2 SQLite file", (".db3",), b"SQLite format 3\x00", messages=True),
-    FileFormat("bag", "ROS 1 bag", (".bag",), b"#ROSBAG V", messages=True),
+    FileFormat("mcap", "MCAP", (".mcap",), b"\x89MCAP0\r\n"),
+    FileFormat("rosbag2", "rosbag2 folder", (), b""),
+    FileFormat("db3", "rosbag2 SQLite file", (".db3",), b"SQLite format 3\x00"),
+    FileFormat("bag", "ROS 1 bag", (".bag",), b"#ROSBAG V"),
     FileFormat("parquet", "Parquet", (".parquet",), b"PAR1"),
     FileFormat("feather", "Feather (Arrow)", (".feather", ".arrow"), b"ARROW1"),
     FileFormat("npz", "NumPy archive", (".npz",), b"PK\x03\x04"),

@@ -100,7 +100,7 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
         layouts = layouts_of(file, home)
         for channel, path in wanted.items():
             if not any(layout.find(path) for layout in layouts):
-                known = [", ".join(list(one.numbers)[:12]) for one in layouts]
+                known = [", ".join([*_paths(one)][:12]) for one in layouts]
                 held = next(filter(None, known), file.listed())
                 setting = "topic" if home == profile.topic else f"{channel}.topic"
                 other = Remedy({setting: None, f"{channel}.source": None})
