@@ -47,7 +47,7 @@ COMMANDS: Mapping[str, str] = {
 """The function of each command, whose module has the command's name, in the order of help."""
 PRINTED = ("inspect", "design", "identify", "validate", "track", "report", "compare")
 """Commands that print tables, or JSON."""
-LETTERS = {"out": ["-o"], "quiet": ["-q"], "verbose": ["-v"]}
+LETTERS = {"out": ["--out"], "quiet": ["-q"], "verbose": ["-v"]}
 KINDS = {Path: "PATH", float: "X", int: "N"}
 """By the type of a value what stands for it."""
 
@@ -149,7 +149,7 @@ def _parameter(one: Option) -> click.Parameter:
         return click.Argument([one.name], nargs=-1 if many else 1, **said)
     if kind is bool:  # what is given switches off what is on
         said = {"flag_value": not one.default, "default": one.default, "is_flag": True}
-    names = [*LETTERS.get(one.name, ()), "--out" if one.name == "out" else one.flag, one.name]
+    names = [*LETTERS.get(one.name, ()), one.flag, one.name]
     return click.Option(names, help=one.help, multiple=many, **said)
 
 

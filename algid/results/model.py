@@ -219,9 +219,7 @@ class TorquePrediction(_Model):
 
         Such as " below 60 Hz".
         """
-        if self.bandwidth is None:
-            return ""
-        return f" below {self.bandwidth:g} Hz"
+        return "" if self.bandwidth is None else f" below {self.bandwidth:g} Hz"
 
     def unexplained(self, least: float) -> tuple[int, ...]:
         """Joints, 1 or 2, with R² below `least` and a residual above `TRIFLE` of their torque.
@@ -379,10 +377,7 @@ class Result(_Model):
     @property
     def delay(self) -> Estimate | None:
         """The estimate of the torque's delay, where there is one."""
-        for name in DELAYS:
-            if name in self.parameters:
-                return self.parameters[name]
-        return None
+        return next((self.parameters[name] for name in DELAYS if name in self.parameters), None)
 
     @property
     def torque_model(self) -> TorqueModel | None:
