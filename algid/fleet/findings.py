@@ -27,7 +27,6 @@ are in standard deviations, times the usual of such distances where that is abov
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 import polars as pl
@@ -194,7 +193,7 @@ def line(own: pl.DataFrame, *by: str) -> pl.DataFrame:
     )
 
 
-def standing_out(own: pl.DataFrame, kind: Literal["payload", "outlier"]) -> pl.DataFrame:
+def standing_out(own: pl.DataFrame, kind: str) -> pl.DataFrame:
     """Outliers of each stint, or payloads unlike what is expected.
 
     The usual distance is the median of distances from their median, the lower one: of two logs the

@@ -115,7 +115,7 @@ def test_weight_that_is_said_not_to_be_there_is_named(said: dict[str, Any]) -> N
     log = logs("raw")[0]
     found = identify(log, report=False, **said)
     assert found.verdict.failed
-    assert "weight" in found.verdict.reasons[0].text
+    assert "effort and gravity" in found.verdict.reasons[0].text
     remedy = found.verdict.reasons[0].remedy
     assert identify(log, report=False, **{**said, **remedy.settings}).verdict.grade == "good"
 

@@ -46,10 +46,10 @@ def test_a_complete_report(browser: Browser, folder: Path, width: int, dark: boo
     seen = browser.look(page, width, dark)
     assert_sound(seen, page, "case1-unloaded.mcap and 1 more · algid")
     # a phone shows the intervals and the torque; what is folded is drawn as it is opened
-    assert seen.drawn == (9 if width > 640 else 2)
+    assert seen.drawn == (8 if width > 640 else 2)
     run = browser.driver.execute_script
     run("for (const part of document.querySelectorAll('details.part')) part.open = true")
-    browser.until("return document.documentElement.dataset.drawn === '11'")
+    browser.until("return document.documentElement.dataset.drawn === '10'")
     assert run("return document.documentElement.dataset.failed") == "0"
     assert run("return document.documentElement.scrollWidth") <= width
     assert seen.background == ("rgb(16, 21, 28)" if dark else "rgb(255, 255, 255)")
