@@ -296,10 +296,7 @@ def test_tables_of_the_guide_and_the_readme_are_those_of_the_code() -> None:
             lambda: algid.identify({}, windows=2.0),  # type: ignore[call-arg]
             "windows: no setting has this name; expected window$",
         ),
-        (lambda: algid.Settings(windows=2.0), "--windows"),  # type: ignore[call-arg]
-        (lambda: algid.identify({}, export="csv"), "--export"),  # type: ignore[arg-type]
         (lambda: algid.validate("none", {}, max_nrmse=-1), "--max-nrmse"),
-        (lambda: algid.export("none", "step"), "--to"),  # type: ignore[arg-type]
         (lambda: algid.export("none", "c", m1=float("nan")), "--set m1"),
         (lambda: algid.compare("none"), "compare"),
         (lambda: algid.compare("a", "b", labels=["c"]), "labels: expected 2, found 1"),
@@ -307,8 +304,6 @@ def test_tables_of_the_guide_and_the_readme_are_those_of_the_code() -> None:
         (lambda: algid.batch([], "out"), "batch: expected logs"),
         (lambda: algid.synthesise("example", rate=100.0), "--rate: the example is always"),
         (lambda: algid.design("case1", margin=0.9), "--set margin"),
-        (lambda: algid.synthesise("case1", drop=2.0), "--set drop"),
-        (lambda: algid.batch("x", "y", timeout=0), "--timeout"),
     ],
 )
 def test_a_keyword_is_refused_as_its_flag_is(ask: Callable[[], object], named: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -135,3 +136,10 @@ def chunks_of(path: Path) -> list[Any]:
     with path.open("rb") as stream:
         summary = make_reader(stream).get_summary()
     return list(summary.chunk_indexes)
+
+
+def poked(content: bytes, place: int, kind: str, *values: int) -> bytes:
+    """The content with other numbers at a place, counted from the end where negative."""
+    changed = bytearray(content)
+    struct.pack_into(kind, changed, place % len(content), *values)
+    return bytes(changed)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import sqlite3
 import struct
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer
 
@@ -19,15 +19,16 @@ from algid.readers import read_log
 from algid.readers.bags import open_messages
 from tests.readers.large import write_db3
 from tests.readers.logs import EPOCH_NS, noise_log, same
-from tests.readers.ways import Message, States, bag1, sent, written
+from tests.readers.mcaps import poked
+from tests.readers.ways import States, bag1, sent, written
 
 LOG = noise_log(200, start_ns=EPOCH_NS)
 PLACES = ("theta1", "theta2", "tau1", "tau2")
 
 
-def bag(folder: Path, *messages: Message) -> Path:
-    """A rosbag2 folder in SQLite."""
-    return Path(written("db3", folder, States(messages or sent(LOG))))
+def bag(folder: Path) -> Path:
+    """The log as a rosbag2 folder in SQLite."""
+    return Path(written("db3", folder, States(sent(LOG))))
 
 
 def taken(*sources: str, **more: Any) -> Profile:
@@ -97,32 +98,19 @@ def test_folders_that_are_no_bag_are_refused(
     assert "\n" not in str(refused.value)
 
 
-def state(row: int, **changes: Any) -> Message:
-    """One a millisecond of two joints, the outer one first."""
-    pair = Message((1, 2), (10, 20), 5 * 10**9 + row * 1_000_000, 10**9 + row, ("b", "a"))
-    return replace(pair, **changes)
-
-
 def test_a_field_needs_a_topic_and_a_topic_its_field(tmp_path: Path) -> None:
-    path = bag(tmp_path, *map(state, range(3)))
+    path = bag(tmp_path)
     sources = ("position[0]", "position[1]", "effort[0]", "effort[1]")
-    with pytest.raises(
-        LogError, match=r"theta1 is taken from 'position\[0\]' without a topic: --topic NAME"
-    ):
+    alone = r"theta1 is taken from 'position\[0\]' without a topic: --topic NAME"
+    with pytest.raises(LogError, match=alone):
         read_log(path, taken(*sources))
     log = read_log(path, taken(*sources, topic="/joint_states"))
-    assert log.tau.tolist() == [[10] * 3, [20] * 3]
+    assert np.array_equal(log.tau, LOG.tau)
     with pytest.raises(LogError, match=r"no message on '/other' has .*--set tau2.topic=NAME"):
         read_log(path, Profile.model_validate({"tau2": {"source": "effort[0]", "topic": "/other"}}))
     for wrong in ("effort[²]", "effort[2]", "header.frame_id"):
         with pytest.raises(LogError, match=r"no message on .* has .* for tau2; found header"):
             read_log(path, Profile.model_validate({"tau2": {"source": wrong}}))
-
-
-def poked(content: bytes, place: int, form: str, value: int) -> bytes:
-    changed = bytearray(content)
-    struct.pack_into(form, changed, place, value)
-    return bytes(changed)
 
 
 def lossy(log: Log) -> tuple[str, str]:

@@ -28,6 +28,7 @@ from tests.readers.mcaps import (
     NO_INDEX,
     chunks_of,
     messages_of,
+    poked,
     write_mcap,
 )
 
@@ -55,13 +56,6 @@ def beginning(path: Path, content: bytes, log: Log = LONG) -> Log:
 
 def lost(found: Log) -> dict[str, str]:
     return {notice.code: notice.text for notice in found.notices if notice.lossy}
-
-
-def poked(content: bytes, place: int, kind: str, *values: int) -> bytes:
-    """The content with other numbers at a place, counted from the end where negative."""
-    changed = bytearray(content)
-    struct.pack_into(kind, changed, place % len(content), *values)
-    return bytes(changed)
 
 
 def flipped(content: bytes, value: float) -> bytes:
