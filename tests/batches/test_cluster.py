@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import pickle
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future
@@ -11,7 +10,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
-import polars as pl
 import pytest
 
 import algid
@@ -25,7 +23,6 @@ from algid.batches.workers import CallFailedError, WorkerDiedError
 from algid.settings import Settings
 from tests.batches import calls
 from tests.batches.clusters import Dask, dask
-from tests.batches.commands import ROOT, Started, start, wait_for_records, write_logs
 
 __all__ = ["dask"]
 
@@ -95,49 +92,3 @@ def test_no_secret_is_in_what_dask_prints_of_a_call() -> None:
     told = job_of("0.1")(pickle.dumps((None, None, calls.add, (task,))))
     assert isinstance(told, Exception)
     assert "SECRET" not in str(told)
-
-
-JOBS = 12
-
-
-@pytest.fixture(scope="module")
-def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("logs")
-    write_logs(folder / "logs", JOBS, ".mcap")
-    return folder
-
-
-def _start(folder: Path, out: Path, dask: Dask) -> Started:
-    """A batch of ``folder/logs`` with relative paths: its own folder is not the workers'."""
-    place = os.path.relpath(out, folder)
-    command = ("batch", "logs", "-o", place, "--no-report", "--scheduler", dask.address)
-    return start(*command, cwd=folder)
-
-
-def _ends(out: Path) -> list[str]:
-    return pl.read_parquet(out / "jobs.parquet")["status"].to_list()
-
-
-@pytest.mark.slow
-def test_a_lost_scheduler_is_told_and_costs_no_job(logs: Path, tmp_path: Path, dask: Dask) -> None:
-    dask.worker()
-    out = tmp_path / "out"
-    first = _start(logs, out, dask)
-    wait_for_records(out, 2)
-    dask.running[0].kill()
-    told, errors = first.communicate(timeout=60)
-    assert first.returncode == 1
-    assert len(errors.splitlines()) == 1
-    assert "run again: what is finished is kept" in errors
-    assert "failed" not in told
-    assert set(_ends(out)) == {"ok"}
-    dask.running[0].wait()
-    dask.scheduler()
-    dask.worker()
-    told, errors = _start(logs, out, dask).communicate(timeout=120)
-    assert f"{JOBS} ok" in told
-    assert errors == ""
-    assert sorted(path.parent.name for path in out.rglob("result.json")) == sorted(
-        f"d{n}.algid" for n in range(JOBS)
-    )
-    assert not list(ROOT.glob("out*"))

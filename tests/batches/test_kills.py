@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 import pytest
@@ -216,20 +217,30 @@ def test_a_full_disk_stops_a_batch_that_ends_as_undisturbed_once_there_is_room(
     assert _digest(out) == undisturbed.digest
 
 
-@pytest.mark.parametrize("victim", ["worker", "batch"])
-def test_on_dask_the_death_of_a_worker_or_of_the_batch_changes_no_result(
+@pytest.mark.parametrize("victim", ["worker", "batch", "scheduler"])
+def test_on_dask_a_death_changes_no_result(
     logs: Path, tmp_path: Path, dask: Dask, undisturbed: Undisturbed, victim: str
 ) -> None:
+    """By relative paths: the folder of the batch is not the workers'."""
     worker, _ = dask.worker(), dask.worker()
-    running = _start(logs, tmp_path / "out", "--scheduler", dask.address)
+    out = os.path.relpath(tmp_path / "out", logs.parent)
+    command = ("batch", logs.name, "-o", out, *QUICK, "--scheduler", dask.address)
+    running = start(*command, cwd=logs.parent)
     wait_for_records(tmp_path / "out", 1)
-    if victim == "worker":
-        worker.kill()
-    else:
-        running.kill()
-        running.communicate()
-        running = _start(logs, tmp_path / "out", "--scheduler", dask.address)
-    told, errors = running.communicate()
-    assert running.returncode == 0, errors
+    victims: dict[str, subprocess.Popen[Any]] = {"worker": worker, "batch": running}
+    killed = victims.get(victim, dask.running[0])
+    killed.kill()
+    if victim != "worker":
+        _, errors = running.communicate(timeout=60)
+        if victim == "scheduler":
+            assert running.returncode == 1
+            assert len(errors.splitlines()) == 1
+            assert "run again: what is finished is kept" in errors
+            killed.wait()
+            dask.scheduler()
+            dask.worker()
+        running = start(*command, cwd=logs.parent)
+    told, errors = running.communicate(timeout=120)
+    assert (running.returncode, errors) == (0, "")
     assert f"{JOBS} ok" in told
     assert _digest(tmp_path / "out") == undisturbed.digest
