@@ -126,21 +126,7 @@ def with_body_of(fit: Fit, body: Sequence[str]) -> Fit:
     if tuple(body) == fit.shared.body:
         return fit
     shared = replace(fit.shared, body=tuple(body))
-    changed = solved_anew(fit, shared, fit.prior, fit.shrinkage)
-    status = list(changed.status)
-    for name, before in zip(fit.names, fit.status, strict=True):
-        if before != "OK" and name in changed.names:
-            status[changed.names.index(name)] = before
-    return replace(
-        changed,
-        status=tuple(status),
-        noise=fit.noise,
-        whiteness=fit.whiteness,
-        residual=fit.residual,
-        iterations=fit.iterations,
-        endogeneity=fit.endogeneity,
-        notes=fit.notes,
-    )
+    return solved_anew(fit, shared, fit.prior, fit.shrinkage)
 
 
 def _worths(fit: Fit) -> list[float]:

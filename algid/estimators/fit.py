@@ -133,6 +133,16 @@ class Fit:
         std[np.array(self.status) == "NOT_IDENTIFIABLE"] = np.inf
         return read_only(std)
 
+    @cached_property
+    def each(self) -> tuple[Fit, ...]:
+        """What each log tells of its own coefficients, by Student's intervals.
+
+        Few stretches of a short log are independent.
+        """
+        white = self.freedom if self.intervals == "likelihood" else 0
+        found = [alone(self.shared, [log], self.shrinkage, white=white) for log in self.logs]
+        return tuple(replace(one, quantile=student_quantile(one.freedom)) for one in found)
+
     @property
     def ci95(self) -> FloatArray:
         """95 % intervals (Q, 2)."""
@@ -296,10 +306,11 @@ def finish(
 def solved_anew(fit: Fit, shared: Shared, prior: Prior | None, shrinkage: Prior | None) -> Fit:
     """The fit of the same likelihoods by other parameters or another prior.
 
-    It starts from what the fit knows, given lengths included; what is new is zero.
+    It starts from what the fit knows, given lengths included; what is new is zero. The arm's own
+    parameters are no surer than they were.
     """
     known = dict(zip(fit.names, fit.values.tolist(), strict=True)) | fit.shared.lengths
-    return finish(
+    anew = finish(
         fit.estimator,
         shared,
         fit.logs,
@@ -311,6 +322,21 @@ def solved_anew(fit: Fit, shared: Shared, prior: Prior | None, shrinkage: Prior 
         repeats=fit.repeats,
         shrinkage=shrinkage,
     )
+    arm = len(shared.log_names)
+    status = [
+        own if before == "OK" else before
+        for own, before in zip(anew.status[:arm], fit.status, strict=False)
+    ]
+    return replace(
+        anew,
+        status=(*status, *anew.status[arm:]),
+        noise=fit.noise,
+        whiteness=fit.whiteness,
+        residual=fit.residual,
+        iterations=fit.iterations,
+        endogeneity=fit.endogeneity,
+        notes=fit.notes,
+    )
 
 
 def alone(
@@ -318,12 +344,16 @@ def alone(
     logs: Sequence[LogInformation],
     prior: Prior | None = None,
     *,
-    coloured: bool = True,
+    white: int = 0,
 ) -> Fit:
-    """The fit of a log's own coefficients, `Shared.log_names`, to logs of one kind alone."""
+    """The fit of a log's own coefficients, `Shared.log_names`, to logs of one kind alone.
+
+    Of residuals that are `white` over so many samples error bars rest on white noise.
+    """
     own, plain = Shared(shared.model, shared.delay), [replace(log, loaded=False) for log in logs]
     nowhere = np.full(2, np.inf)
-    return finish("weak", own, plain, logs[0].c0, nowhere, prior, coloured=coloured)
+    c0 = logs[0].c0
+    return finish("weak", own, plain, c0, nowhere, prior, coloured=not white, samples=white)
 
 
 OF_FEW = 2.3

@@ -15,7 +15,7 @@ from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import constrained
 from algid.estimators.excitation import undriven
-from algid.estimators.fit import Fit
+from algid.estimators.fit import Fit, solved_anew
 from algid.estimators.hold import Hold
 from algid.estimators.terms import (
     CHOICE,
@@ -162,8 +162,24 @@ def run_fit(
         raise ValueError(f"{estimator.name} gives time series, not a fit")
     estimate = estimator.fit
 
-    def fitted(selection: Selection) -> Fit:
-        return estimate(problem_of(survey, settings, selection, prior))
+    def most_likely(chosen: Selection, settings: Settings) -> tuple[Fit, Selection]:
+        """The fit of the chosen terms, or of those that its own likelihood chooses."""
+        fit = estimate(problem_of(survey, settings, chosen, prior))
+        better, other = fit, chosen
+        for _ in range(_REVISIONS):
+            # its own likelihood has noise levels that the first pass lacked
+            if chosen.chosen_by != "logs" or better.products is None:
+                break
+            nothing = absent(settings.effort, COLUMN_NAMES)
+            again = revised(other, better.products, settings.terms, nothing)
+            if (again.model.terms, again.delay) == (other.model.terms, other.delay):
+                break
+            other, better = again, estimate(problem_of(survey, settings, again, prior))
+            if not better.refuted:
+                fit, chosen = better, other
+            elif not fit.refuted:
+                break
+        return fit, chosen
 
     with long_enough(survey):
         # why no term is chosen but every one shrunk, if so
@@ -171,21 +187,14 @@ def run_fit(
         if chosen.refuted and settings.chooses and estimator.name == "refined":
             notes = (Notice("REFUTED", numbers={"case": "noise", "kept": "weak"}),)
         else:
-            fit = fitted(chosen)
-            better, other = fit, chosen
-            for _ in range(_REVISIONS):
-                # its own likelihood has noise levels that the first pass lacked
-                if chosen.chosen_by != "logs" or better.products is None:
-                    break
-                nothing = absent(settings.effort, COLUMN_NAMES)
-                again = revised(other, better.products, settings.terms, nothing)
-                if (again.model.terms, again.delay) == (other.model.terms, other.delay):
-                    break
-                other, better = again, fitted(again)
-                if not better.refuted:
-                    fit, chosen = better, other
-                elif not fit.refuted:
-                    break
+            fit, chosen = most_likely(chosen, settings)
+            if fit.refuted and settings.lengths and survey.loaded:
+                # wrong lengths refute a likelihood that holds with any, and so does a point in the
+                # place of a body: both are judged by the one that holds
+                free, other = most_likely(chosen, settings.but(l1=None, l2=None))
+                if not free.refuted:
+                    shared = replace(free.shared, lengths=settings.lengths, body=())
+                    fit, chosen = solved_anew(free, shared, prior, None), other
             if fit.refuted and settings.chooses:
                 notes = fit.notes
         picked = chosen

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import PurePath
 from typing import Literal
 
 import numpy as np
@@ -34,7 +35,7 @@ import numpy as np
 from algid import results
 from algid.arm import FloatArray
 from algid.base.names import within
-from algid.base.significance import SURE, chance
+from algid.base.significance import NORMAL, SURE, chance
 from algid.base.units import TORQUE
 from algid.estimators.combine import of_kind
 from algid.estimators.diagnostics import (
@@ -286,6 +287,45 @@ def _of_arms(found: Fitted) -> Iterator[Notice]:
         yield Notice("LOGS_APART", numbers={"case": "apart"} | numbers)
 
 
+ALIKE = 0.01
+"""Standard deviation of a constant from log to log, relative, that no error bar need take in."""
+
+
+def _of_odd_logs(found: Fitted) -> Iterator[Notice]:
+    """That logs called alike are not of one arm, by k1 … k5 of each by itself.
+
+    A log is odd that is apart from most of the others. Where those are no majority, nobody knows
+    which are right.
+    """
+    fit, survey = found.fit, found.survey
+    for logs, loaded in ((survey.unloaded, False), (survey.loaded, True)):
+        own = [one for one, log in zip(fit.each, fit.logs, strict=True) if log.loaded is loaded]
+        if len(own) != len(logs) or len(own) < 2:  # of others some were too short
+            continue
+        rigid = np.flatnonzero(np.isin(own[0].names, RIGID))
+        values = np.array([one.values for one in own])[:, rigid]
+        spread = np.array([one.quantile / NORMAL * one.std for one in own])
+        spread = np.hypot(spread[:, rigid], ALIKE * values)
+        apart = np.abs(values[:, None] - values)
+        distance = apart / np.hypot(spread[:, None], spread)
+        far = distance.max(axis=2)
+        np.fill_diagonal(far, np.inf)
+        middle = np.argsort(far, axis=1)[:, (len(own) - 2) // 2]  # of the others
+        typical = far[np.arange(len(own)), middle]
+        odd, one = np.flatnonzero(typical > FAR), int(np.argmax(typical))
+        if odd.size:
+            place = int(np.argmax(distance[one, middle[one]]))
+            numbers = {
+                "case": "odd" if 2 * odd.size < len(own) else "unlike",
+                "names": [PurePath(logs[number].name).name for number in odd],
+                "name": own[one].names[rigid[place]],
+                "values": values[[one, middle[one]], place].tolist(),
+                "distance": float(typical[one]),
+                "p_value": chance(float(typical[one])),
+            }
+            yield Notice("LOGS_APART", numbers=numbers)
+
+
 @dataclass(frozen=True)
 class Check:
     """One check of a fit.
@@ -314,6 +354,7 @@ CHECKS = (
     Check("NO_PAYLOAD", _of_payload),
     Check("LENGTH_CONTRADICTED", _of_length),
     Check("LOGS_APART", _of_arms),
+    Check("LOGS_APART", _of_odd_logs),
 )
 """Checks of a finished fit, in order. What is checked while it is made has its share in
 `algid.base.significance` too, and a consequence of its own: another estimate (REFUTED,

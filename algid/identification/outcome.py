@@ -15,7 +15,7 @@ from algid.arm import CONSTANT_NAMES
 from algid.base.names import outside, places_outside, within
 from algid.base.significance import chance, level
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, repeatability, term_worths
-from algid.estimators.fit import Fit, alone
+from algid.estimators.fit import Fit
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
 from algid.estimators.prediction import PredictionScore, cross_validate
 from algid.estimators.terms import Selection
@@ -186,10 +186,9 @@ def fit_summary(found: Fitted) -> results.FitSummary:
         noise = dict(zip(("theta1", "theta2", "tau1", "tau2"), squares, strict=True))
     there, lost = places_outside(fit.names, fit.absent), np.isinf(fit.std)
     covariance = np.where(lost | lost[:, None], np.inf, fit.covariance)[np.ix_(there, there)]
-    by_log, coloured = [], fit.intervals != "likelihood"
-    for log in fit.logs:
-        own = alone(fit.shared, [log], fit.shrinkage, coloured=coloured)
-        own = replace(own, quantile=fit.quantile)
+    by_log = []
+    for log in fit.each:
+        own = replace(log, quantile=fit.quantile)
         statuses = np.where(np.isfinite(own.std), "OK", "NOT_IDENTIFIABLE").tolist()
         by_log.append(_estimates(own, statuses))
     repeated = None

@@ -56,6 +56,7 @@ CAUSES = (
     "EXTERNAL_EFFORT",
     "GRAVITY_COMPENSATED:arm",
     "LENGTH_CONTRADICTED",
+    "LOGS_APART:unlike",
     "SENSOR_FAULT:angle",
     "SENSOR_FAULT:torque",
     "LOST_SAMPLES",
@@ -86,6 +87,8 @@ def _failure(result: Result) -> str | None:
         return next((one.text for one in worse + broken), "physics forbids these estimates")
     if result.payload and wrong_length(result.notices):
         return "a link length contradicts the arm's constants"
+    if has_code(result.notices, "LOGS_APART:unlike"):
+        return "the logs are not of one arm"
     asked = requested(result).values()
     usable = [one for one in asked if one.usable]
     # a number whose interval is merely around zero is none to use, nor has a prior measured one

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from algid.arm import FloatArray
 from algid.identification.identify import identify
 from algid.log import Log
+from algid.notices import of_codes
+from algid.settings import Settings
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 from pipelines.planar import PAYLOAD, Row, drawn, scene
@@ -19,10 +22,40 @@ from tests.intervals import distances
 CHANCE = 4.5  # standard deviations: once in 150 000
 
 
-def moved(constants: FloatArray, seed: int) -> Log:
+POINT = CARRIED, ARM.l2, 0.0, 0.0
+
+
+def moved(constants: FloatArray, seed: int, fastest: float = 8.0) -> Log:
     """A log of the paper's first arm with these constants, under a wide torque."""
-    motion = simulate(constants, wide_multi_sine(ARM, seed), times())
+    frequency = tuple(np.geomspace(0.3, fastest, 6).tolist())
+    torque = replace(wide_multi_sine(ARM, seed), frequency=(frequency, frequency))
+    motion = simulate(constants, torque, times())
     return log_of(motion, motion.tau, seed)
+
+
+@pytest.mark.parametrize("share", [0.91, 0.95, 1.0])
+def test_a_length_is_named_that_refutes_the_likelihood_and_is_short(share: float) -> None:
+    """An inertia of the payload takes up what the length lacks, and the mass would be wrong."""
+    logs = moved(ARM.phasors(), 1, 2.0), moved(ARM.phasors(*POINT), 2, 2.0)
+    result = identify(*logs, Settings(l2=share * ARM.l2), report=False)
+    named = [one.numbers["name"] for one in of_codes(result.notices, "LENGTH_CONTRADICTED")]
+    assert named == ["l2"] * (share < 1)
+    assert result.verdict.failed is bool(named)
+
+
+def test_a_log_with_a_payload_among_unloaded_ones_is_named() -> None:
+    """Of two logs nobody knows which is odd."""
+    bare, other = (moved(ARM.phasors(), seed) for seed in (1, 2))
+    burdened = moved(ARM.phasors(*POINT), 3)
+    for logs, case, names in (
+        ([bare, burdened], "unlike", ["run 1", "run 3"]),
+        ([bare, burdened, other], "odd", ["run 3"]),
+    ):
+        result = identify(logs, report=False)
+        (one,) = of_codes(result.notices, "LOGS_APART")
+        assert (one.numbers["case"], one.numbers["names"]) == (case, names)
+        assert result.verdict.failed is (case == "unlike")
+    assert not identify([bare, other], report=False).notices
 
 
 def test_a_payload_off_the_line_of_a_straight_arm_is_found() -> None:
