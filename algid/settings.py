@@ -188,9 +188,7 @@ class Settings(BaseModel):
         """After how long a logged torque acts: its hold, and the `delay` in s, or the one set."""
         from algid.signals.shift import TorqueShift
 
-        if delay is None:
-            delay = self.delay
-        return TorqueShift(self.torque_hold == "zoh", delay)
+        return TorqueShift(self.torque_hold == "zoh", self.delay if delay is None else delay)
 
     def as_json(self) -> dict[str, Any]:
         """For `result.json`; complex poles as text, the paper's where none are set."""

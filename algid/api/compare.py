@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from algid.api import Answer
-from algid.api.options import called, opened, stem_of, verb
+from algid.api.options import opened, stem_of, verb
 from algid.base.errors import SettingError
 from algid.options import Option
 from algid.results import Result
@@ -75,7 +75,7 @@ def compare(
         )
     if labels is not None and len(labels) != len(given):
         raise SettingError(f"labels: expected {len(given)}, found {len(labels)}")
-    labels = labels or [stem_of(Path(called(one))) for one in given]
+    labels = labels or list(map(stem_of, given))
     comparison = compared(list(map(opened, given)), labels)
     if out is not None:
         write_comparison(comparison, page_of(Path(out)), force)

@@ -137,7 +137,7 @@ def export(
         raise SettingError(f"{flag('flange')}: {to} holds no flange; leave it out")
     path = None if out is None else Path(out)
     if path == Path() or (path is not None and path.is_dir() and draws is None):
-        name = stem_of(Path(file))
+        name = stem_of(result)
         if to == "python" and draws is None:  # a module is imported by its name
             name = re.sub(r"\W", "_", name)
         path /= name + ("-draws" if draws is not None else SUFFIXES.get(to, "-payload.yaml"))

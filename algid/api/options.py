@@ -355,9 +355,10 @@ def called(given: Result | str | Path) -> str:
     return str(given) if isinstance(given, str | Path) else given.log.path
 
 
-def stem_of(result: Path) -> str:
-    """The name of a result's folder less its suffix, given by that or by its result.json."""
-    return (result.resolve().parent if result.name == "result.json" else result.resolve()).stem
+def stem_of(result: Result | str | Path) -> str:
+    """What a result is called: its folder, given by that or by its result.json, or its log."""
+    place = Path(called(result)).resolve()
+    return (place.parent if place.name == "result.json" else place).stem
 
 
 def folder_or_none(folder: Path | None, force: bool) -> AbstractContextManager[Path | None]:

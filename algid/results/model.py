@@ -395,10 +395,8 @@ class Result(_Model):
 
         It is one number for all estimates: that of the fit's effective degrees of freedom.
         """
-        for one in self.estimates.values():
-            if one.half and one.std:
-                return one.half / one.std
-        return NORMAL
+        every = self.estimates.values()
+        return next((one.half / one.std for one in every if one.half and one.std), NORMAL)
 
     @property
     def complete(self) -> bool:
