@@ -55,14 +55,6 @@ def test_json_integers_beyond_64_bits_are_no_traceback(digits: int, tmp_path: Pa
         assert read_log(path).theta[0, 7] == float(number)
 
 
-@pytest.mark.parametrize("seconds", [float("nan"), float("inf"), 1e300, 10**30])
-def test_seconds_that_are_no_time_late_in_json_are_refused(seconds: float, tmp_path: Path) -> None:
-    path = changed_json(tmp_path, 150, lambda one: one["header"]["stamp"].update(sec=seconds))
-    with pytest.raises(LogError, match=r"header stamp with .* --set clock=log"):
-        read_log(path)
-    assert same(read_log(path, Profile(clock="log")), LOG)
-
-
 @pytest.mark.parametrize("encoding", ["cdr", "json"])
 @pytest.mark.parametrize("name", ["a1", "1"])
 def test_a_joint_named_twice_is_refused_and_read_by_its_place(
