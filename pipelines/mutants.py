@@ -43,7 +43,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "batches": ("batches",),
     "cli": FRONT,
     "designs": ("designs",),
-    "estimators": ("estimators", *GOLDEN),
+    "estimators": ("estimators", "identification/test_validate.py", *GOLDEN),
     "exports": ("exports",),
     "fleet": ("fleet",),
     "identification": ("identification", *GOLDEN),
