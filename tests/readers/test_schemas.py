@@ -101,7 +101,7 @@ def test_structures_in_any_order_are_known_by_their_names_and_have_their_own_sta
     messages = []
     for row, stamp in enumerate(LOG.stamp_ns.tolist()):
         sec, nanosec = divmod(stamp, 10**9)
-        joints = [("j1", *sample(0, row)), ("j2", *sample(1, row))][:: -1 if row % 3 else 1]
+        joints = [("1]", *sample(0, row)), ("2]", *sample(1, row))][:: -1 if row % 3 else 1]
         if encoding == "json":
             own = [dict(zip(("name", "position", "effort"), one, strict=True)) for one in joints]
             arm = {"stamp": {"sec": sec, "nanosec": nanosec}, "joints": own}

@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,16 @@ class Number:
     offset: int
     kind: str
     width: int
+
+
+class Named(NamedTuple):
+    """A number by a name: its place, what the names and the list are called, what is behind it."""
+
+    place: str
+    label: str
+    list: str
+    name: str
+    behind: str
 
 
 @dataclass
@@ -87,13 +97,13 @@ class MessageLayout:
                 self.texts[at] = (*names, text)
 
     @cached_property
-    def named(self) -> dict[str, str]:
-        """By path in which names stand for places (``position[elbow]``) that of the number.
+    def named(self) -> dict[str, Named]:
+        """By path in which names stand for places (``position[elbow]``) the number's own.
 
         The names are those of a list of texts beside the list and as long as that, or of the
         list's structures (``joints[elbow].position``).
         """
-        named = dict[str, str]()
+        named = dict[str, Named]()
         # what lies within a list has names of its own first: interface_values[elbow].values[effort]
         for at, texts in sorted(self.texts.items(), key=lambda one: -one[0].count(".")):
             own, sizes = re.escape(at[: at.rfind(".") + 1]) + r"[^.\[\]]+", dict[str, int]()
@@ -103,16 +113,19 @@ class MessageLayout:
             for one in filter(None, map(beside.fullmatch, [*self.numbers, *self.labels])):
                 if not one[3]:
                     sizes[one[1]] = max(sizes.get(one[1], 0), int(one[2]) + 1)
-            for path, place in [*zip(self.numbers, self.numbers, strict=True), *named.items()]:
+            places = dict(zip(self.numbers, self.numbers, strict=True))
+            for path, place in (places | {path: one.place for path, one in named.items()}).items():
                 match = beside.fullmatch(path)
-                name = texts[int(match[2])] if match and int(match[2]) < len(texts) else None
+                name = texts[int(match[2])] if match and int(match[2]) < len(texts) else ""
                 if match and texts.count(name) == 1 and sizes.get(match[1]) in (None, len(texts)):
-                    named[f"{path[: match.start(2)]}{name}{path[match.end(2) :]}"] = place
+                    full = f"{path[: match.start(2)]}{name}{path[match.end(2) :]}"
+                    parts = (at.rpartition(".")[2], match[1].rpartition(".")[2], name, match[3])
+                    named[full] = Named(place, *parts)
         return named
 
     def find(self, path: str) -> Number | None:
         """The number at a path, or None; a joint may be called "1", and is meant then."""
-        return self.numbers.get(self.named.get(path, path))
+        return self.numbers.get(self.named[path].place if path in self.named else path)
 
     def missing(self, wanted: Iterable[str]) -> list[str]:
         """Those of the `wanted` paths that the message lacks; none where it is of other joints.

@@ -33,8 +33,6 @@ _SAMPLES = 64
 TOPIC = Remedy({"topic": None})
 _USUAL = "/joint_states"
 _STEMS = frozenset(chain.from_iterable(STEMS.values()))
-_INDEXED = re.compile(r"(\w+)\[([^\]]*)\](?=(.*))")
-"""A list, a place or name within it, and what follows."""
 _WORD, _VALUES = re.compile(r"\w+"), ("value", "values")
 _TELLING = (b"effort", b"tau_est", b"tau_J")
 """Names of torques in definitions: of ROS, Unitree, libfranka."""
@@ -303,25 +301,30 @@ def fields_in(topic: str, layout: MessageLayout) -> dict[str, TopicField]:
     LookupError
         If a joint is named twice.
     """
-    joints, fields, twice = set[str](), dict[str, TopicField](), list[str]()
+    fields, twice = dict[str, TopicField](), list[str]()
     for at, names in layout.texts.items():
         if at.rpartition(".")[2] in NAMES:
-            joints |= set(names[: LIMITS.joints])
             twice += repeated(names)
-    called = {place: path for path, place in layout.named.items()}
+    called = _called(layout)
     for place in layout.numbers:
-        name, joint, path = place, "", called.get(place, place)
-        for match in _INDEXED.finditer(path if place in called else ""):
+        name, field = place, TopicField(place, topic)
+        if path := called.get(place):
+            one = layout.named[path]
             # of a structure's field, of an interface of a DynamicJointState, or of a list
-            word = "_".join(one for one in _WORD.findall(match[3]) if one not in _VALUES)
-            if match[2] in joints and (match[3] or match[1] in _STEMS):
-                joint = match[2]
-                name = f"{topic}/{joint}/{word or match[1]}"
-                twice += [joint] * (name in fields)
-        fields[name] = TopicField(path if joint else place, topic, joint)
+            word = "_".join(each for each in _WORD.findall(one.behind) if each not in _VALUES)
+            if one.label in NAMES and (one.behind or one.list in _STEMS):
+                name = f"{topic}/{one.name}/{word or one.list}"
+                field = TopicField(path, topic, one.name)
+                twice += [one.name] * (name in fields)
+        fields[name] = field
     if twice:
         raise LookupError(f"its messages name the joint {twice[0]!r} twice")
     return fields
+
+
+def _called(layout: MessageLayout) -> dict[str, str]:
+    """By place of a number its path in which names stand for places."""
+    return {one.place: path for path, one in layout.named.items()}
 
 
 def names_in(layout: MessageLayout) -> tuple[str, ...]:
@@ -357,7 +360,7 @@ def fields_shown(file: MessageFile, number: int) -> tuple[tuple[str, ...], tuple
 
 def _paths(layout: MessageLayout) -> Iterator[str]:
     """The paths of a message's numbers, and its empty lists."""
-    called = {place: path for path, place in layout.named.items()}
+    called = _called(layout)
     for place in layout.numbers:
         yield called.get(place, place)
     for path in layout.empty:
