@@ -219,9 +219,9 @@ def answer(ended: Batched, _given: Mapping[str, Any]) -> Answer:
         f"{ended.out}/jobs.parquet"
     )
     ended_as = Exit.FAILED if "incomplete" in ended.counts else Exit.OK
-    if ended.failed or ended.left or ended.stopped is not None:
+    if ended.failed or ended.left or ended.stopped:
         ended_as = Exit.LIMIT
-    if ended.stopped is not None:
+    if ended.stopped:
         complaints.append(ended.stopped)
     elif ended.interrupted:
         ended_as = Exit.STOPPED

@@ -57,13 +57,14 @@ def shown(answer: Answer, json: bool, quiet: bool) -> None:
     if json and answer.json is not None:
         parts = [answer.json().rstrip()]
     for part in parts:
-        if isinstance(part, Manual) and sys.stdout.isatty():
+        if isinstance(part, Manual):
+            if not sys.stdout.isatty():
+                print(part, end="")  # its examples of credentials are none
+                continue
             from rich.console import Console
             from rich.markdown import Markdown
 
             Console(width=min(Console().width, 120)).print(Markdown(part))
-        elif isinstance(part, Manual):
-            print(part, end="")  # its examples of credentials are none
         elif isinstance(part, str):
             say(part)
         else:
