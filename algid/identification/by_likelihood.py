@@ -188,13 +188,13 @@ def run_fit(
             notes = (Notice("REFUTED", numbers={"case": "noise", "kept": "weak"}),)
         else:
             fit, chosen = most_likely(chosen, settings)
-            if fit.refuted and settings.lengths and survey.loaded:
+            if fit.refuted and _is_doubtful(fit):
                 # wrong lengths refute a likelihood that holds with any, and so does a point in the
                 # place of a body: both are judged by the one that holds
                 free, other = most_likely(chosen, settings.but(l1=None, l2=None))
                 if not free.refuted:
                     shared = replace(free.shared, lengths=settings.lengths, body=())
-                    fit, chosen = solved_anew(free, shared, prior, None), other
+                    fit, chosen = solved_anew(free, shared, free.prior, None), other
             if fit.refuted and settings.chooses:
                 notes = fit.notes
         picked = chosen
@@ -211,6 +211,18 @@ def run_fit(
 
 _REVISIONS = 3
 """Fits at most after the first one."""
+
+
+def _is_doubtful(fit: Fit) -> bool:
+    """Whether a given length is outside the interval that the same likelihoods have for it."""
+    if not (fit.shared.payload and fit.shared.lengths):
+        return False
+    free = solved_anew(fit, replace(fit.shared, lengths={}), fit.prior, fit.shrinkage)
+    intervals = dict(zip(free.names, free.ci95.tolist(), strict=True))
+    return any(
+        not intervals[name][0] <= given <= intervals[name][1]
+        for name, given in fit.shared.lengths.items()
+    )
 
 
 def finished(fit: Fit, settings: Settings) -> Fit:
