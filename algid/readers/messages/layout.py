@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -143,6 +143,7 @@ class MessageLayout:
         return [path for path in wanted if self.find(path) is None]
 
 
+@lru_cache(maxsize=1 << 12)
 def tells(path: str) -> bool:
     """True for the place of a text that names an arm, a recording, or a structure of a list."""
     return path.rpartition(".")[2] in GROUPS or bool(_NAMED.fullmatch(path))
