@@ -189,8 +189,8 @@ def run_fit(
         else:
             fit, chosen = most_likely(chosen, settings)
             if fit.refuted and _is_doubtful(fit):
-                # wrong lengths refute a likelihood that holds with any, and so does a point in the
-                # place of a body: both are judged by the one that holds
+                # wrong lengths refute a likelihood that holds with any others: checks see them by
+                # the one that holds
                 free, other = most_likely(chosen, settings.but(l1=None, l2=None))
                 if not free.refuted:
                     shared = replace(free.shared, lengths=settings.lengths, body=())
