@@ -18,7 +18,7 @@ from algid.estimators.fit import Fit
 from algid.estimators.prediction import PredictionScore
 from algid.estimators.terms import Selection
 from algid.identification.by_likelihood import Fitted
-from algid.identification.checks import remarks
+from algid.identification.checks import fit_notes, remarks
 from algid.identification.outcome import (
     estimate,
     outcome_of,
@@ -28,7 +28,7 @@ from algid.identification.recordings import Recordings, open_source
 from algid.identification.validate import prediction
 from algid.log import Log, Origin
 from algid.notices import Notice
-from algid.results import FitSummary, Status
+from algid.results import Estimate, FitSummary, Repeatability, Status
 from algid.settings import Settings
 from algid.table4 import LOADED_ROWS, UNLOADED_ROWS
 from tests.identification.fits import CASE, QUANTILE, K, fit_of, information, with_stds, with_values
@@ -196,6 +196,21 @@ def test_a_length_that_the_constants_contradict_is_named() -> None:
         )
     )
     assert one.numbers["p_value"] == pytest.approx(2 * norm.sf(1.01 * ACCUSED))
+
+
+def test_repeatability_and_a_gain_of_one_are_told_in_numbers() -> None:
+    repeated = Repeatability(masses=[0.5, 0.51234], std=0.0087, ci95=(0.0039, 0.28))
+    gain = Estimate(estimate=1.02, std=0.01, ci95=(1.0, 1.04), unit="1")
+    summary = FitSummary(
+        noise={}, covariance_names=[], covariance=[], iterations=0, converged=True,
+        intervals="likelihood", repeatability=repeated, torque_gain=gain,
+    )  # fmt: skip
+    told = {one.key: one for one in fit_notes(summary)}
+    assert told["REPEATABILITY:payload"].text == (
+        "the loaded runs by themselves weigh 0.5, 0.5123 kg: repeatability 0.0087 kg (95 %: "
+        "0.0039 to 0.28)"
+    )
+    assert told["TORQUE_GAIN:known"].note
 
 
 def test_cross_validation_that_could_not_be_done_is_told() -> None:
