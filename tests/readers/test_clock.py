@@ -280,3 +280,14 @@ def test_a_clock_set_back_by_more_than_a_short_log_so_far_starts_a_run() -> None
     found, told = ordered(table(stamps), runs=True)
     assert len(found) == stamps.size
     assert [one.code for one in told] == ["GAPS"]
+
+
+@pytest.mark.parametrize(("repeats", "fits"), [(20, True), (21, False)])
+def test_half_of_the_stamps_may_repeat(repeats: int, fits: bool) -> None:
+    stamps = np.concatenate([np.arange(40 - repeats), np.full(repeats, 39 - repeats)])
+    if fits:
+        _, (said,) = ordered(table(stamps))
+        assert said.text.startswith("20 samples repeat a stamp; the first of each was kept; 20 ")
+    else:
+        with pytest.raises(LogError, match="time stands still: 21 of 40 stamps as the one before"):
+            ordered(table(stamps))

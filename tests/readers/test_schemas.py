@@ -305,3 +305,34 @@ def test_a_protobuf_number_that_is_unset_is_no_zero(presence: str, tmp_path: Pat
     else:
         assert log.tau[1].tolist() == [row + 1.0 for row in range(0, 40, 2)]
         assert lost == [f"20 messages on '{TOPIC}' left out for want of {source}"]
+
+
+@pytest.mark.parametrize(("flag", "bad"), [("valid", 0), ("error_code", 17)])
+def test_messages_that_a_flag_calls_no_measurement_are_left_out(
+    flag: str, bad: int, tmp_path: Path
+) -> None:
+    wild = range(50, 60)
+    definition = b"float64[2] q\nfloat64[2] tau\nuint8 other\nbool valid\nint32 error_code\n"
+    messages = []
+    for row, one in enumerate(sent(LOG)):
+        says = {"valid": 1, "error_code": 0} | ({flag: bad} if row in wild else {})
+        q = np.array(one.position) + (row in wild)
+        content = struct.pack("<4B4dBB2xi", 0, 1, 0, 0, *q, *one.effort, row % 256, *says.values())
+        messages.append((TOPIC, one.stamp, content))
+    known = ("arm_msgs/msg/State", "ros2msg", definition)
+    path = write_mcap(tmp_path / "log.mcap", messages, known)
+    found = read_log(path, named("q[0] q[1] tau[0] tau[1]"))
+    kept = np.delete(np.arange(200), wild)
+    np.testing.assert_array_equal(found.theta, LOG.theta[:, kept])
+    np.testing.assert_array_equal(found.tau, LOG.tau[:, kept])
+    (notice,) = (one for one in found.notices if one.key == "MESSAGES_LEFT_OUT:fields")
+    assert notice.numbers["count"] == 10
+    assert notice.numbers["fields"] == flag
+
+
+@pytest.mark.parametrize("seconds", [float("nan"), float("inf"), 1e300, 10**30])
+def test_seconds_that_are_no_time_late_in_json_are_refused(seconds: float, tmp_path: Path) -> None:
+    path = changed_json(tmp_path, 150, lambda one: one["header"]["stamp"].update(sec=seconds))
+    with pytest.raises(LogError, match=r"header stamp with .* --set clock=log"):
+        read_log(path)
+    assert same(read_log(path, Profile(clock="log")), LOG)
