@@ -49,7 +49,7 @@ from algid.readers.memory import open_columns
 
 def opened(path):
     table = open_columns(pl.read_csv(path, skip_rows=1))
-    return replace(table, path=str(path), kind="toy")
+    return replace(table, kind="toy")
 '''
 FORMAT = """    FileFormat("toy", "Toy log", (".toy",), b"TOYLOG"),
 """
@@ -257,8 +257,8 @@ def add_toys(package: Path) -> None:
     """An entry in each registry but that of terms: a module, and a line or an entry."""
     inserted(
         package / "base" / "units.py",
-        '    Unit("N cm"',
-        '    Unit("N mm", ("torque",), 1e-3, "nmm n-mm"),\n',
+        "N cm ",
+        "N mm | torque | 0.001 | nmm n-mm\n",
     )
     (package / "readers" / "toy.py").write_text(READER)
     formats = package / "readers" / "formats.py"
