@@ -323,6 +323,10 @@ def bent(fit: Fit) -> bool:
     return bool(own) and float(chi2_tail(len(own), fit.wald(own))) < 0.05
 
 
+_LEAST_TAIL = float(np.finfo(float).tiny)
+"""Probability: smaller ones are zero, and infinitely far."""
+
+
 def payload_distance(fit: Fit) -> float | None:
     """How far the loaded logs are from the unloaded arm with any payload.
 
@@ -352,7 +356,8 @@ def payload_distance(fit: Fit) -> float | None:
     nothing = np.zeros_like(burdened.values)
     information = LogInformation(True, burdened.values, S[None], nothing[None])
     _, _, value = combine(fit.shared, [information], fit.values, arm)
-    return max(0.0, normal_exceeded(float(chi2_tail(freedom, max(0.0, -2 * value)))))
+    tail = max(float(chi2_tail(freedom, max(0.0, -2 * value))), _LEAST_TAIL)
+    return max(0.0, normal_exceeded(tail))
 
 
 def _singular(covariance: FloatArray) -> bool:

@@ -143,6 +143,16 @@ class Fit:
         found = [alone(self.shared, [log], self.shrinkage, white=white) for log in self.logs]
         return tuple(replace(one, quantile=student_quantile(one.freedom)) for one in found)
 
+    @cached_property
+    def with_free_lengths(self) -> Fit:
+        """The same likelihoods solved without the given link lengths, where a payload shows them.
+
+        A wrong one moves the constants too.
+        """
+        if not (self.shared.lengths and self.shared.payload):
+            return self
+        return solved_anew(self, replace(self.shared, lengths={}), self.prior, self.shrinkage)
+
     @property
     def ci95(self) -> FloatArray:
         """95 % intervals (Q, 2)."""

@@ -215,13 +215,11 @@ _REVISIONS = 3
 
 def _is_doubtful(fit: Fit) -> bool:
     """Whether a given length is outside the interval that the same likelihoods have for it."""
-    if not (fit.shared.payload and fit.shared.lengths):
-        return False
-    free = solved_anew(fit, replace(fit.shared, lengths={}), fit.prior, fit.shrinkage)
+    free, given = fit.with_free_lengths, fit.shared.lengths
     intervals = dict(zip(free.names, free.ci95.tolist(), strict=True))
     return any(
-        not intervals[name][0] <= given <= intervals[name][1]
-        for name, given in fit.shared.lengths.items()
+        not intervals[name][0] <= given[name] <= intervals[name][1]
+        for name in within(given, free.names)
     )
 
 

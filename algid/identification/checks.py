@@ -48,7 +48,7 @@ from algid.estimators.diagnostics import (
     payload_distance,
 )
 from algid.estimators.excitation import contradicted, undriven
-from algid.estimators.fit import Fit, alone, solved_anew
+from algid.estimators.fit import Fit, alone
 from algid.estimators.prediction import PredictionScore
 from algid.estimators.robust import unshrunk
 from algid.identification.by_likelihood import Fitted
@@ -256,17 +256,14 @@ def _of_payload(found: Fitted) -> Iterator[Notice]:
 def _of_length(found: Fitted) -> Iterator[Notice]:
     """That a given length is not what the logs show.
 
-    l1 is g k1 / k2 of the constants, and both are the payload's where the same likelihoods are
-    solved without the given ones.
+    l1 is g k1 / k2 of the constants, and both are the payload's.
     """
-    fit = found.fit
+    fit, free = found.fit, found.fit.with_free_lengths
     given, measured = fit.shared.lengths, list[tuple[str, float, float]]()
-    if "l1" in given and (by_constants := length_by_constants(fit)) is not None:
+    if "l1" in given and (by_constants := length_by_constants(free)) is not None:
         measured.append(("l1", *by_constants))
-    if given and fit.shared.payload:
-        free = solved_anew(fit, replace(fit.shared, lengths={}), fit.prior, fit.shrinkage)
-        by_name = zip(free.names, free.values.tolist(), free.std.tolist(), strict=True)
-        measured += [one for one in by_name if one[0] in given]
+    by_name = zip(free.names, free.values.tolist(), free.std.tolist(), strict=True)
+    measured += [one for one in by_name if one[0] in given]
     said = set[str]()
     for name, length, std in measured:
         numbers = contradicting(name, given[name], length, std, fit.quantile)
@@ -281,7 +278,7 @@ def _of_arms(found: Fitted) -> Iterator[Notice]:
     far = exchanged(found.fit)
     if far:
         yield Notice("LOGS_APART", numbers={"case": "exchanged", "p_value": chance(far)})
-    apart = payload_distance(found.fit)
+    apart = payload_distance(found.fit.with_free_lengths)
     if apart is not None and apart > FAR:
         numbers = {"distance": apart, "p_value": chance(apart)}
         yield Notice("LOGS_APART", numbers={"case": "apart"} | numbers)

@@ -181,7 +181,7 @@ def test_a_length_that_the_constants_contradict_is_named() -> None:
     """g k1 / k2 is l1 by Table 1, here uncertain by √2 %."""
     std = 0.01 * math.sqrt(2) * ARM.l1
     for times, told in ((0.99 * ACCUSED, False), (1.01 * ACCUSED, True)):
-        fit = fit_of(lengths={"l1": ARM.l1 + times * std})
+        fit = fit_of(payload=False, lengths={"l1": ARM.l1 + times * std})
         assert bool(found(fit, "LENGTH_CONTRADICTED")) is told
     (one,) = found(fit, "LENGTH_CONTRADICTED")
     given = ARM.l1 + 1.01 * ACCUSED * std

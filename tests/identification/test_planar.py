@@ -35,11 +35,15 @@ def moved(constants: FloatArray, seed: int, fastest: float = 8.0) -> Log:
 
 @pytest.mark.parametrize("share", [0.91, 0.95, 1.0])
 def test_a_length_is_named_that_refutes_the_likelihood_and_is_short(share: float) -> None:
-    """An inertia of the payload takes up what the length lacks, and the mass would be wrong."""
+    """An inertia of the payload takes up what the length lacks, and the mass would be wrong.
+
+    The wrong one moves the constants, and with them what they say of the right one and of the arm.
+    """
     logs = moved(ARM.phasors(), 1, 2.0), moved(ARM.phasors(*POINT), 2, 2.0)
-    result = identify(*logs, Settings(l2=share * ARM.l2), report=False)
+    result = identify(*logs, Settings(l1=ARM.l1, l2=share * ARM.l2), report=False)
     named = [one.numbers["name"] for one in of_codes(result.notices, "LENGTH_CONTRADICTED")]
     assert named == ["l2"] * (share < 1)
+    assert not of_codes(result.notices, "LOGS_APART")
     assert result.verdict.failed is bool(named)
 
 
