@@ -61,7 +61,9 @@ def verdict_lines(judged: Verdict, width: int = WIDTH, most: int | None = None) 
     for reason in judged.reasons[:most]:
         text = reason.sentence
         if most is not None:  # in two lines, its code behind it
-            text = _short(reason.text, 2, 12 + len(reason.code))
+            # where no command applies what mends it, as in Python, it says so itself
+            text = reason.text if judged.command else reason.clause
+            text = _short(text, 2, 12 + len(reason.code))
         lines += lines_of(f"{visible(text, 2_000)} [{reason.code}]", width, " • ", "   ")
     left = judged.reasons[most or len(judged.reasons) :]
     if left:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from algid.notices import Notice, Verdict
+from algid.notices import Notice, Remedy, Verdict
 from algid.report.terminal import WIDTH, brief, verdict_lines
 from algid.results import Result
 from algid.results.model import TorqueModel
@@ -50,9 +50,14 @@ def test_a_simulated_log_shows_its_errors_and_a_long_meaning_breaks(result: Resu
 
 
 def test_the_command_to_run_first_is_one_line_to_be_copied() -> None:
-    command = "algid identify 'runs/of may/arm 1.csv' --zero hanging " + 9 * "--force "
+    command: str | None = "algid identify 'runs/of may/arm 1.csv' --zero hanging " + 9 * "--force "
     lines = verdict_lines(Verdict("failed", "it failed", command=command))
     assert lines == ["Failed: it failed.", f"Run first: {command}"]
+    # without one, as in Python, a reason says what mends it
+    reason = Notice("WRONG", "wrong by physics: zero", remedies=(Remedy({"zero": "hanging"}),))
+    for command, said in ((None, ": --zero hanging"), ("algid identify", "")):
+        judged = Verdict("failed", "it failed", (reason,), command=command)
+        assert verdict_lines(judged, most=1)[1] == f" • wrong by physics: zero{said} [WRONG]"
 
 
 def test_the_terms_are_named(result: Result) -> None:
