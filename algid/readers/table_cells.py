@@ -193,7 +193,8 @@ def cells_of(table: TableFile) -> dict[str, Cell]:
         import polars as pl
 
         with as_log_error(table.kind):
-            frame = pl.DataFrame(next(table.batches(nested), None))
+            none = table.schema.empty_table().select(nested)
+            frame = pl.DataFrame(next(table.batches(nested), none))
     metadata = table.metadata
     label, joints = _spoken(table)
     cells: dict[str, Cell] = {}
