@@ -125,6 +125,8 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
         'time=2026-01-31T12:00:00Z\npayload=0.5\nsite="Ulm"\n'
     )
     assert is_manifest(tmp_path / "m.csv")
+    (tmp_path / "empty.csv").touch()
+    assert not is_manifest(tmp_path / "empty.csv")
     (first,) = jobs_of([str(tmp_path / "m.csv")], "out")
     assert jobs_of([str(tmp_path / "m.toml")], "out") == [first]
     assert first == Job(
@@ -196,7 +198,7 @@ def test_what_else_a_row_holds_is_a_label(tmp_path: Path) -> None:
 )
 def test_a_name_that_could_leave_the_folder_of_results_is_refused(name: str) -> None:
     assert name_fault(name) is not None
-    assert name_fault("r1/day 2/a.b" + "/…" + "/ä" * 100) is None
+    assert name_fault("r1/day 2/a.b" + "/…/" + "ä" * 100) is None
 
 
 def test_a_folder_where_nobody_may_look_fails_alone(

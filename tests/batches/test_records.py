@@ -100,7 +100,8 @@ def test_records_of_other_versions_keep_their_rows(logs: Path) -> None:
     older, newer = _sound(), _sound()
     del older["job"]["trouble"], older["start_ns"]
     older["inputs"][0]["ctime_ns"] = 5
-    newer["job"]["name"] = "newer"
+    newer["job"] |= {"name": "newer", "time": None}
+    newer["start_ns"] = 1_769_857_200 * 10**9
     newer |= {"colour": "red", "version": "99"}
     newer["job"]["mood"] = 1
     (out / ".jobs").mkdir(parents=True)
@@ -110,6 +111,7 @@ def test_records_of_other_versions_keep_their_rows(logs: Path) -> None:
     table = pl.read_parquet(out / "jobs.parquet")
     assert table["job"].to_list() == ["a", "b", "newer", "other"]
     assert table["label_site"].to_list() == [None, None, "Ulm", "Ulm"]
+    assert table["label_payload"].to_list() == [None, None, 0.5, 0.5]
     assert [str(time) for time in table["time"]][2:] == ["2026-01-31 11:00:00+00:00"] * 2
 
 

@@ -108,7 +108,7 @@ def test_a_bad_log_fails_alone_and_the_table_has_a_row_a_job(logs: Path) -> None
     result = algid.read_result(logs.parent / "out/r1/a.algid")
     row = table.row(1, named=True)
     assert row["k1"] == result.parameters["k1"].estimate
-    assert row["estimator"] == "weak"
+    assert (row["estimator"], row["log_seconds"]) == ("weak", 4.0)
     assert row["m_p_std"] == result.payload["m_p"].std
     assert row["sha256"] == [log.sha256 for log in result.logs]
     assert row["size"] == [Path(log.path).stat().st_size for log in result.logs]
@@ -252,7 +252,9 @@ def test_a_watch_takes_logs_once_they_stay_as_they_are_and_tells_a_trouble_once(
     batch.run(jobs_of([str(made)], str(out)))
     batch.watch(look, True, told.append)
     assert here.ran == [*found, *found, "growing"]  # what failed before is tried again once
-    assert set(pl.read_parquet(out / "jobs.parquet")["job"]) == {*found, "growing"}
+    table = pl.read_parquet(out / "jobs.parquet")
+    assert set(table["job"]) == {*found, "growing"}
+    assert "as asked" in table["reason"].to_list()
     assert told == ["away"]
 
 
