@@ -199,7 +199,9 @@ def spikes(log: Log) -> Iterator[Notice]:
         limit = _SPIKE * quantile(usual[even] if even.any() else usual, 0.9)
         if not limit > 0:  # hardly a sample differs from its neighbours
             continue
-        marks, places = _odd(values, common, limit), _odd(values, np.pad(bend > limit, 1), limit)
+        marks, places = (
+            _odd(log.t, values, doubtful, limit) for doubtful in (common, np.pad(bend > limit, 1))
+        )
         if 2 * marks.size > np.count_nonzero(common):
             places = np.union1d(places, marks)
         if places.size and name.startswith("tau"):
@@ -214,10 +216,13 @@ def spikes(log: Log) -> Iterator[Notice]:
             yield _found("SENSOR_FAULT", log.origin, name, case="spikes", **seen)
 
 
-def _odd(values: FloatArray, doubtful: NDArray[np.bool_], limit: float) -> NDArray[np.intp]:
+def _odd(
+    t: FloatArray, values: FloatArray, doubtful: NDArray[np.bool_], limit: float
+) -> NDArray[np.intp]:
     """Places of `doubtful` samples beyond `limit` off the line between the others on both sides.
 
-    Without them these others fit one another: the sample after a step has none that do.
+    Without them these others fit one another: the sample after a step has none that do. Behind a
+    gap in the times t a signal has moved on.
     """
     here, rest = np.flatnonzero(doubtful), np.flatnonzero(~doubtful)
     behind = np.searchsorted(rest, here)
@@ -227,7 +232,9 @@ def _odd(values: FloatArray, doubtful: NDArray[np.bool_], limit: float) -> NDArr
     off = np.abs(values[here] - 0.5 * (values[before] + values[after]))
     bend = _bend(values[rest])
     fits = np.maximum(bend[behind - 2], bend[behind - 1]) < 0.2 * off
-    return here[fits & (off > limit) & (after - before <= _IN_A_ROW + 1)]
+    steps = after - before
+    near = (steps <= _IN_A_ROW + 1) & (t[after] - t[before] < 2 * steps * median(np.diff(t)))
+    return here[fits & near & (off > limit)]
 
 
 def _bend(values: FloatArray) -> FloatArray:

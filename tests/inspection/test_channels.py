@@ -263,6 +263,15 @@ def test_many_spikes_of_one_value_are_counted_and_a_value_that_fits_is_none(shar
     assert found.numbers["count"] == pytest.approx(missed.sum(), rel=0.3)
 
 
+def test_samples_between_two_gaps_are_no_spikes() -> None:
+    """The torque has moved on while none was logged, and back."""
+    whole = logged(tau2=10 * np.sin(TURN * T) + 1e-3 * NOISE[3])
+    kept = (T < 0.15) | (T > 0.35) | (np.abs(T - 0.25) < 1e-3)
+    theta, tau = whole.theta[:, kept], whole.tau[:, kept]
+    log = Log(whole.stamp_ns[kept], theta, tau, whole.origin)
+    assert not of_codes(of_signals(log), *SPIKES)
+
+
 @pytest.mark.parametrize("period", [math.sqrt(53), math.sqrt(137), math.sqrt(1623)])
 def test_samples_in_a_period_are_those_of_the_faster_joint(period: float) -> None:
     """Phases are spread evenly: medians of first and second differences are of one phase."""
