@@ -196,13 +196,13 @@ def line(own: pl.DataFrame, *by: str) -> pl.DataFrame:
 def standing_out(own: pl.DataFrame, kind: str) -> pl.DataFrame:
     """Outliers of each stint, or payloads unlike what is expected.
 
-    The usual distance is the median of distances from their median, the lower one: of two logs the
-    one that agrees with its label shows how well they can.
+    The usual distance is the median of distances from their median, of payloads the lower one: of
+    two logs the one that agrees with its label shows how well they can.
     """
     far = pl.col("sigmas")
     off = (pl.col("value") - pl.col("expected")) / pl.col("std")
     apart = (far - far.quantile(0.5, "lower").over("robot", "stint")).abs()
-    usual = apart.quantile(0.5, "lower").over("robot", "stint")
+    usual = apart.quantile(0.5, "lower" if kind == "payload" else "linear").over("robot", "stint")
     judged = own.with_columns(sigmas=off, kind=pl.lit(kind)).drop_nulls("sigmas")
     judged = judged.with_columns(far / (MAD * usual).clip(1.0))
     return judged.filter(far.abs() > (CLEAR if kind == "payload" else OUTLYING))

@@ -163,6 +163,14 @@ def test_an_outlier_is_six_deviations_away(
         assert found["sigmas"][0] == pytest.approx(away, rel=1e-3)
 
 
+@pytest.mark.parametrize("values", [[1.0, 1.2], [1.0, 1.0, 0.9, 1.1]])
+def test_logs_that_scatter_as_much_as_each_other_are_no_outliers(
+    values: list[float], tmp_path: Path
+) -> None:
+    """Of two that disagree nobody knows which is odd."""
+    assert not history_in(tmp_path, table(values)).findings.filter(kind="outlier").height
+
+
 @pytest.mark.parametrize(("payload", "told"), [(0.50492, False), (0.50494, True), (0.49506, True)])
 def test_a_label_is_wrong_once_in_a_million(payload: float, told: bool, tmp_path: Path) -> None:
     jobs = table(
