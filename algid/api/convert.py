@@ -11,7 +11,7 @@ from algid.api import Answer
 from algid.api.options import LogOptions, ProfileLike, meant, verb
 from algid.base.errors import exit_of
 from algid.notices import Notice, Remedy, lossy
-from algid.settings import OF_BOTH
+from algid.settings import DEFAULTS, OF_BOTH
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
@@ -78,9 +78,10 @@ def convert(
     own = meant(profile, options)
     reader = open_log(source, own)
     notices: list[Notice] = []
-    said = {} if own is None else own.model_dump(include={*OF_BOTH}, exclude_defaults=True)
+    said = {} if own is None else own.model_dump(include={*OF_BOTH})
     # what samples in SI units do not hold; a current is a torque by now
-    left = {name: one for name, one in said.items() if one not in ("raw", "current", "observer")}
+    nothing = None, "raw", "current"
+    left = {name: one for name, one in said.items() if one not in (DEFAULTS[name], *nothing)}
     if left:
         numbers = {"case": "kept", "said": ", ".join(left)}
         again = Remedy(left, "where the file is used")

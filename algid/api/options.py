@@ -333,7 +333,7 @@ def set_by(lines: Iterable[str], known: Collection[str]) -> dict[str, Any]:
     found = dict[str, Any]()
     for line in lines:
         name, equals, text = line.partition("=")
-        if not equals:
+        if not equals or not name.strip():
             raise SettingError(f"{flag('set')} {line}: expected KEY=VALUE like tau1.sign=-1")
         value: Any = text.strip()
         with suppress(ValueError, RecursionError):

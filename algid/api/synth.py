@@ -47,15 +47,17 @@ def _pairs(given: Any) -> Any:
     return [part.split("=") for part in given.split(",")] if isinstance(given, str) else given
 
 
-_Start = Annotated[float, within(PHYSICAL.speed)]
-_Positive = Annotated[float, within((0, PHYSICAL.duration[1]))]
+_Angle = Annotated[float, within(PHYSICAL.angle)]
+_Speed = Annotated[float, within(PHYSICAL.speed)]
+_Time = Annotated[float, within((0, PHYSICAL.duration[1]))]
+_Mass = Annotated[float, within((0, PHYSICAL.mass[1]))]
 State = Annotated[
     Sequence[float] | str,
-    Option(check=Annotated[tuple[_Start, _Start, _Start, _Start], BeforeValidator(parts_of)]),
+    Option(check=Annotated[tuple[_Angle, _Angle, _Speed, _Speed], BeforeValidator(parts_of)]),
 ]
 Schedule = Annotated[
     Sequence[tuple[float, float]] | str,
-    Option(check=Annotated[list[tuple[_Positive, _Positive]], BeforeValidator(_pairs)]),
+    Option(check=Annotated[list[tuple[_Time, _Mass]], BeforeValidator(_pairs)]),
 ]
 Moment = Annotated[
     datetime | date | str,

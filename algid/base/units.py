@@ -6,6 +6,7 @@ and the guide. Adding one is an entry.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -19,51 +20,66 @@ class Unit:
         As algid writes it.
     quantities : of "angle", "velocity", "torque", "current" and "time"
         What is logged in it. A velocity's is the angle's unit a second.
-    factor : float
-        In rad, rad/s, N m, A or s; 0 where a profile says it, as of encoder counts.
+    factor : float or None
+        In rad, rad/s, N m, A or s; None where a profile says it, as of encoder counts.
     spellings : str
         Other names between blanks, in lower case.
     """
 
     name: str
     quantities: tuple[str, ...]
-    factor: float
+    factor: float | None
     spellings: str
 
 
-# A weight of 1 kg is 9.80665 N, one of a pound 4.4482216152605 N; a foot is 0.3048 m.
-_TABLE = """\
-rad    | angle velocity | 1                     | rad radian radians rads rad/s rad.s-1 rads/s \
-radians/s radian/s
-mrad   | angle velocity | 0.001                 | mrad milliradian milliradians mrad/s
-deg    | angle velocity | 0.017453292519943295  | deg degree degrees degs ° deg/s degrees/s \
-degree/s °/s dps
-rev    | angle velocity | 6.283185307179586     | rev revs revolution revolutions turn turns rev/s \
-turns/s rps
-counts | angle velocity | 0                     | counts count ticks tick inc increments counts/s \
-ticks/s
-rpm    | velocity       | 0.10471975511965977   | rpm rev/min
-N m    | torque         | 1                     | nm n-m newtonmeter newtonmetre newtonmeters \
-newtonmetres newton-meter newton-meters
-mN m   | torque         | 0.001                 | mnm mn-m millinewtonmeter
-N cm   | torque         | 0.01                  | ncm n-cm
-kN m   | torque         | 1000                  | knm kn-m
-kgf m  | torque         | 9.80665               | kgfm kgm kgf-m kg-m
-kgf cm | torque         | 0.0980665             | kgfcm kgcm kgf-cm kg-cm
-lbf ft | torque         | 1.3558179483314003    | lbfft lbft lb-ft lbf-ft ftlb ftlbf ft-lb ft-lbf
-lbf in | torque         | 0.1129848290276167    | lbfin lbin lb-in lbf-in inlb inlbf in-lb in-lbf
-ozf in | torque         | 0.0070615518142260435 | ozfin ozin oz-in ozf-in inoz in-oz
-A      | current        | 1                     | a amp amps ampere amperes
-mA     | current        | 0.001                 | ma milliamp milliamps milliampere milliamperes
-s      | time           | 1                     | s sec secs second seconds
-ms     | time           | 0.001                 | ms msec msecs milli millis millisecond \
-milliseconds
-us     | time           | 1e-06                 | us µs μs usec usecs micro micros microsecond \
-microseconds
-ns     | time           | 1e-09                 | ns nsec nsecs nano nanos nanosecond nanoseconds"""
-UNITS = tuple(
-    Unit(name.strip(), tuple(quantities.split()), float(factor), spellings.strip())
-    for name, quantities, factor, spellings in (line.split("|") for line in _TABLE.splitlines())
+_TURN = 2 * math.pi
+_TURNING = ("angle", "velocity")
+_KILOGRAM = 9.80665  # N, its weight under standard gravity
+_POUND = 4.4482216152605  # N
+_FOOT = 0.3048  # m
+
+UNITS = (
+    Unit("rad", _TURNING, 1.0, "rad radian radians rads rad/s rad.s-1 rads/s radians/s radian/s"),
+    Unit("mrad", _TURNING, 1e-3, "mrad milliradian milliradians mrad/s"),
+    Unit(
+        "deg",
+        _TURNING,
+        math.pi / 180,
+        "deg degree degrees degs ° deg/s degrees/s degree/s °/s dps",
+    ),
+    Unit("rev", _TURNING, _TURN, "rev revs revolution revolutions turn turns rev/s turns/s rps"),
+    Unit("counts", _TURNING, None, "counts count ticks tick inc increments counts/s ticks/s"),
+    Unit("rpm", ("velocity",), _TURN / 60, "rpm rev/min"),
+    Unit(
+        "N m",
+        ("torque",),
+        1.0,
+        "nm n-m newtonmeter newtonmetre newtonmeters newtonmetres newton-meter newton-meters",
+    ),
+    Unit("mN m", ("torque",), 1e-3, "mnm mn-m millinewtonmeter"),
+    Unit("N cm", ("torque",), 1e-2, "ncm n-cm"),
+    Unit("kN m", ("torque",), 1e3, "knm kn-m"),
+    Unit("kgf m", ("torque",), _KILOGRAM, "kgfm kgm kgf-m kg-m"),
+    Unit("kgf cm", ("torque",), _KILOGRAM / 100, "kgfcm kgcm kgf-cm kg-cm"),
+    Unit(
+        "lbf ft",
+        ("torque",),
+        _POUND * _FOOT,
+        "lbfft lbft lb-ft lbf-ft ftlb ftlbf ft-lb ft-lbf",
+    ),
+    Unit(
+        "lbf in",
+        ("torque",),
+        _POUND * _FOOT / 12,
+        "lbfin lbin lb-in lbf-in inlb inlbf in-lb in-lbf",
+    ),
+    Unit("ozf in", ("torque",), _POUND * _FOOT / 192, "ozfin ozin oz-in ozf-in inoz in-oz"),
+    Unit("A", ("current",), 1.0, "a amp amps ampere amperes"),
+    Unit("mA", ("current",), 1e-3, "ma milliamp milliamps milliampere milliamperes"),
+    Unit("s", ("time",), 1.0, "s sec secs second seconds"),
+    Unit("ms", ("time",), 1e-3, "ms msec msecs milli millis millisecond milliseconds"),
+    Unit("us", ("time",), 1e-6, "us µs μs usec usecs micro micros microsecond microseconds"),
+    Unit("ns", ("time",), 1e-9, "ns nsec nsecs nano nanos nanosecond nanoseconds"),
 )
 
 
@@ -73,7 +89,11 @@ def names_of(*quantities: str) -> tuple[str, ...]:
 
 
 def _factors(quantity: str) -> dict[str, float]:
-    return {unit.name: unit.factor for unit in UNITS if quantity in unit.quantities and unit.factor}
+    return {
+        unit.name: unit.factor
+        for unit in UNITS
+        if quantity in unit.quantities and unit.factor is not None
+    }
 
 
 ANGLE = _factors("angle")

@@ -189,6 +189,7 @@ def spikes(log: Log) -> Iterator[Notice]:
     """
     if len(log) < 20:
         return
+    t = log.t / log.period
     for name, values in channels(log):
         bend = _bend(values)
         bent = values[1:-1][bend >= quantile(thinned(bend), 0.9)]
@@ -200,7 +201,7 @@ def spikes(log: Log) -> Iterator[Notice]:
         if not limit > 0:  # hardly a sample differs from its neighbours
             continue
         marks, places = (
-            _odd(log.t, values, doubtful, limit) for doubtful in (common, np.pad(bend > limit, 1))
+            _odd(t, values, doubtful, limit) for doubtful in (common, np.pad(bend > limit, 1))
         )
         if 2 * marks.size > np.count_nonzero(common):
             places = np.union1d(places, marks)
@@ -222,7 +223,7 @@ def _odd(
     """Places of `doubtful` samples beyond `limit` off the line between the others on both sides.
 
     Without them these others fit one another: the sample after a step has none that do. Behind a
-    gap in the times t a signal has moved on.
+    gap in the times t, in periods, a signal has moved on.
     """
     here, rest = np.flatnonzero(doubtful), np.flatnonzero(~doubtful)
     behind = np.searchsorted(rest, here)
@@ -233,7 +234,7 @@ def _odd(
     bend = _bend(values[rest])
     fits = np.maximum(bend[behind - 2], bend[behind - 1]) < 0.2 * off
     steps = after - before
-    near = (steps <= _IN_A_ROW + 1) & (t[after] - t[before] < 2 * steps * median(np.diff(t)))
+    near = (steps <= _IN_A_ROW + 1) & (t[after] - t[before] < 2 * steps)
     return here[fits & near & (off > limit)]
 
 

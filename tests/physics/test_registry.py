@@ -257,8 +257,8 @@ def add_toys(package: Path) -> None:
     """An entry in each registry but that of terms: a module, and a line or an entry."""
     inserted(
         package / "base" / "units.py",
-        "N cm ",
-        "N mm | torque | 0.001 | nmm n-mm\n",
+        '    Unit("N cm"',
+        '    Unit("N mm", ("torque",), 1e-3, "nmm n-mm"),\n',
     )
     (package / "readers" / "toy.py").write_text(READER)
     formats = package / "readers" / "formats.py"
