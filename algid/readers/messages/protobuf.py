@@ -159,13 +159,13 @@ class _Walk:
         elif wire == 2 and own.type == _MESSAGE:
             self.message(first, stop, own.type_name, f"{place}.")
         elif wire == 2 and own.type == _STRING:
-            text = self.data[first:stop].decode("utf-8", errors="replace")
             if repeated or tells(path):
                 self.layout.pin(first, stop)
-            if repeated:
-                self.layout.texts[path] = (*self.layout.texts.get(path, ()), text)
-            elif tells(path):
-                self.layout.label(path, text)
+                text = self.data[first:stop].decode("utf-8", errors="replace")
+                if repeated:
+                    self.layout.texts[path] = (*self.layout.texts.get(path, ()), text)
+                else:
+                    self.layout.label(path, text)
         elif wire == 0 and kind and not width:
             self.layout.flags.extend(range(first, stop))
             self.layout.numbers[place] = Number(first, kind, stop - first)
