@@ -13,13 +13,11 @@ from algid.base.limits import LIMITS
 from algid.base.text import repeated
 from algid.notices import Notice, Remedy
 from algid.profile import Profile
-from algid.readers.annotations import lines_of, units_in
 from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.column_names import STEMS, ChannelChoice, choose
-from algid.readers.messages import json, protobuf
 from algid.readers.messages.layout import NAMES, Decoder, MessageLayout
 from algid.readers.messages.message_file import MessageFile
-from algid.readers.messages.topic import codec_for, topic_tables
+from algid.readers.messages.topic import codec_for, stated_of, topic_tables
 from algid.readers.table import (
     REFERENCES,
     Clock,
@@ -111,7 +109,7 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
         if profile.clock == "header" and stamps[home] is None:
             log_clock = Remedy({"clock": "log"})
             raise LogError(f"messages on {home!r} carry no stamp: {log_clock}")
-        stated, lines = _stated_of(file, home, paths, layouts)
+        stated, lines = stated_of(file.channel(home), paths, layouts)
         units |= stated
         said += lines
     # topics have one clock: the recorder's where one of them has no stamps that move
@@ -183,31 +181,6 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
         tuple(notices),
         tuple(said),
     )
-
-
-def _stated_of(
-    file: MessageFile, topic: str, paths: Mapping[str, str], layouts: Sequence[MessageLayout]
-) -> tuple[dict[str, str], list[str]]:
-    """By field the unit that a topic's schema or metadata state; what else is stated, as text.
-
-    `paths` are those of the fields in the messages.
-    """
-    channel = file.channel(topic)
-    text = channel.definition.decode("utf-8", errors="replace")
-    metadata, lines = dict(channel.metadata), list(lines_of(channel.metadata))
-    if channel.encoding == "json":
-        own = json.properties(text)
-        metadata |= own
-        lines += [f"{key}: {said}" for key, said in own.items() if key.endswith("description")]
-        labels = layouts[0].labels.items()
-        lines += [f"{path}: {label}" for path, label in labels if "unit" in path]
-    elif channel.definition_encoding.startswith("ros"):
-        lines += [line for line in text.splitlines() if "#" in line or "//" in line]
-    elif channel.encoding == "protobuf":
-        lines += protobuf.comments(channel.definition)
-    lists = {name: path.partition("[")[0] for name, path in paths.items()}
-    units = units_in(metadata, list(dict.fromkeys(lists.values())))
-    return {name: units[path] for name, path in lists.items() if path in units}, lines
 
 
 def _references_of(file: MessageFile, joints: Sequence[str]) -> dict[str, TopicField]:

@@ -11,11 +11,11 @@ import numpy as np
 
 from algid.base.errors import LogError
 from algid.notices import Notice, Remedy
-from algid.readers.annotations import several
+from algid.readers.annotations import lines_of, several, units_in
 from algid.readers.flat import to_nanoseconds
 from algid.readers.messages import protobuf, ros
-from algid.readers.messages.json import JsonRecords
-from algid.readers.messages.layout import Codec, Decoder, MisfitError
+from algid.readers.messages.json import JsonRecords, properties
+from algid.readers.messages.layout import Codec, Decoder, MessageLayout, MisfitError
 from algid.readers.messages.message_file import MessageChannel, MessageFile
 from algid.readers.table import ROWS, SampleTable, stack
 
@@ -56,6 +56,30 @@ def codec_for(channel: MessageChannel) -> Codec:
     )
 
 
+def stated_of(
+    channel: MessageChannel, paths: Mapping[str, str], layouts: Sequence[MessageLayout] = ()
+) -> tuple[dict[str, str], list[str]]:
+    """By field the unit that a channel's schema or metadata state; what else is stated, as text.
+
+    `paths` are those of the fields in the messages.
+    """
+    text = channel.definition.decode("utf-8", errors="replace")
+    metadata, lines = dict(channel.metadata), list(lines_of(channel.metadata))
+    if channel.encoding == "json":
+        own = properties(text)
+        metadata |= own
+        lines += [f"{key}: {said}" for key, said in own.items() if key.endswith("description")]
+        for path, label in layouts[0].labels.items() if layouts else ():
+            lines += [f"{path}: {label}"] * ("unit" in path)
+    elif channel.definition_encoding.startswith("ros"):
+        lines += [line for line in text.splitlines() if "#" in line or "//" in line]
+    elif channel.encoding == "protobuf":
+        lines += protobuf.comments(channel.definition)
+    lists = {name: path.partition("[")[0] for name, path in paths.items()}
+    units = units_in(metadata, list(dict.fromkeys(lists.values())))
+    return {name: units[path] for name, path in lists.items() if path in units}, lines
+
+
 def topic_tables(
     files: Sequence[Callable[[], MessageFile]],
     topic: str,
@@ -82,7 +106,8 @@ def topic_tables(
     Raises
     ------
     LogError
-        If half of the messages do not fit their schema, or their stamps are none.
+        If half of the messages do not fit their schema, their stamps are none, or a file states
+        other units than those before it.
     """
     wanted, place = dict(paths), f"topic {topic!r}"
     if stamp is not None:
@@ -115,6 +140,7 @@ def topic_tables(
         floats = {name: np.asarray(values, np.float64) for name, values in columns.items()}
         return SampleTable(stamps, floats)
 
+    known: dict[str, str] | None = None
     for opened in files:
         file = opened()
         channels = file.topics.get(topic)
@@ -122,7 +148,16 @@ def topic_tables(
             absent = {"case": "file", "file": file.path, "topic": topic}
             told.append(Notice("MESSAGES_LEFT_OUT", numbers=absent))
             continue
-        decoder = Decoder(wanted, codec_for(file.channel(topic)))
+        channel = file.channel(topic)
+        units, _ = stated_of(channel, paths)
+        if known not in (None, units):
+            said = [", ".join(map(" in ".join, one.items())) or "none" for one in (units, known)]
+            raise LogError(
+                f"{place}: {file.path} states other units ({said[0]}) than the files before it "
+                f"({said[1]}); read each file for itself"
+            )
+        known, codec = units, codec_for(channel)
+        decoder = Decoder(wanted, codec)
         found, lost, unchecked = 0, list[str](), False
         parts, size = list[SampleTable](), 0
         for messages in file.batches(channels):
@@ -143,6 +178,15 @@ def topic_tables(
                 parts, size = [], 0
         if parts:
             yield clocked(parts)
+        publishers = list[int]()
+        for number in sorted(channels) if len(channels) > 1 else ():
+            batches = file.batches(frozenset((number,)))
+            sound = (one for one in batches if len(one) and not isinstance(one, str))
+            first = next(sound, None)
+            if first is not None and Decoder(wanted, codec).columns(first)[0].any():
+                publishers.append(number)
+        if len(publishers) > 1:
+            told.append(several(f"publisher of {topic}", publishers))
         others = Counter[str]()
         for number, channel in file.channels.items():
             if channel.topic == topic and number not in channels and file.counts.get(number):
