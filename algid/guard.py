@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import resource
+import shutil
 import signal
 import sys
 import threading
@@ -70,7 +71,7 @@ def reading(path: str) -> Iterator[None]:
     tell(f"<{path}")
     _allowances.append(allowance)
     try:
-        alive()
+        signal.setitimer(signal.ITIMER_PROF, max(_allowances))
         yield
     finally:
         _allowances.remove(allowance)
@@ -78,10 +79,11 @@ def reading(path: str) -> Iterator[None]:
         tell(f">{path}")
 
 
-def alive() -> None:
-    """Give reading its time anew: sound records have come, even if no sample."""
-    if _allowances:
-        signal.setitimer(signal.ITIMER_PROF, max(_allowances))
+def delete(place: Path) -> None:
+    """Delete a file, a link or a folder, as far as it goes."""
+    shutil.rmtree(place, ignore_errors=True)
+    with suppress(OSError):
+        place.unlink()
 
 
 class Notes:
@@ -98,12 +100,8 @@ class Notes:
 
     def remove_unfinished(self) -> None:
         """Remove what a process that is gone had under construction."""
-        import shutil
-
         for place in self.making:
-            shutil.rmtree(place, ignore_errors=True)
-            with suppress(OSError):
-                Path(place).unlink()
+            delete(Path(place))
 
     def end(self, number: int) -> tuple[int, str]:
         """Exit code and line for a process that the signal of a number has ended."""
@@ -133,14 +131,11 @@ def begin(send: Callable[[str], object], parent: int, memory: int | None = None)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent too, which decides
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    limits = [memory or int(SHARE * _memory())]
-    limits += [hard] if hard != resource.RLIM_INFINITY else []
     # data, not address space: allocators and threads reserve far more addresses than they use
-    resource.setrlimit(resource.RLIMIT_DATA, (min(limits), hard))
+    with suppress(ValueError):  # the process has a lower bound already
+        resource.setrlimit(resource.RLIMIT_DATA, (memory or int(SHARE * _memory()), hard))
     if os.environ.get(TRACEBACK) != "1":  # a library that breaks has lines of its own
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, 2)
-        os.close(nowhere)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     if sys.platform == "linux":
         import ctypes
 

@@ -41,7 +41,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "significance", "numpy scipy", PURE
     ),
     "methods": room("estimators"),
-    "files": room("errors limits options staging", "pydantic"),
+    "files": room("errors guard limits options staging", "pydantic"),
     "stores": room("errors files", "pyarrow"),
     "runtime": room(packages="threadpoolctl"),
     "profile": room("errors files limits options units", "pydantic"),

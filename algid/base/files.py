@@ -22,7 +22,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from algid.base.errors import OutputError, SettingError
 from algid.base.limits import LIMITS
-from algid.base.staging import delete, delete_leftovers, put, staged, temporary_name
+from algid.base.staging import delete_leftovers, put, staged, temporary_name
+from algid.guard import delete
 from algid.options import flag
 
 if TYPE_CHECKING:
@@ -103,10 +104,8 @@ def _whole(place: Path, make: Callable[[Path], None], force: bool) -> Iterator[P
             temporary = stack.enter_context(staged(place, make))
         with writing(place):
             yield temporary
-            try:
-                put(temporary, place, replace=force)
-            except FileExistsError as error:
-                raise OutputError(EXISTS.format(place)) from error
+            refuse_existing(place, force)  # another process may have made it meanwhile
+            put(temporary, place)
 
 
 def sha256_of(path: Path) -> str:
@@ -243,12 +242,6 @@ def misfit(error: ValidationError) -> tuple[str, str]:
     return place, f"{said}, found {found:.60}{more}"
 
 
-EXISTS = (
-    f"{{}}: exists already; choose another folder with {flag('out')}, or replace it with "
-    f"{flag('force')}"
-)
-
-
 def result_folder(first_log: str, parent: Path, name: str | None = None) -> Path:
     """Where the result of a log goes: `parent/NAME.algid`, NAME the log's stem by default."""
     if name is None:
@@ -279,7 +272,10 @@ def refuse_existing(folder: Path, force: bool) -> None:
     """Raises `OutputError` where `folder` is a URL, or exists and is not to be replaced."""
     refuse_url(folder)
     if os.path.lexists(folder) and not force:
-        raise OutputError(EXISTS.format(folder))
+        raise OutputError(
+            f"{folder}: exists already; choose another folder with {flag('out')}, or replace it "
+            f"with {flag('force')}"
+        )
 
 
 def remove_whole(place: Path) -> None:

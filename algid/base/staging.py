@@ -7,21 +7,18 @@ one was left by a killed process and is deleted. Where a file system has no lock
 from __future__ import annotations
 
 import ctypes
-import errno
 import fcntl
 import os
 import secrets
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from algid.guard import tell
+from algid.guard import delete, tell
 
 TEMPORARY = f".*.algid-{'[0-9a-f]' * 8}"
 """Pattern of temporary names: ``.NAME.algid-0123abcd``."""
-_HERE, _NOREPLACE, _EXCHANGE = -100, 1, 2  # of linux/fcntl.h and linux/fs.h
-_CANNOT = (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP, errno.EPERM)
+_HERE, _EXCHANGE = -100, 2  # of linux/fcntl.h and linux/fs.h
 
 
 def temporary_name(path: Path) -> Path:
@@ -52,13 +49,6 @@ def staged(path: Path, make: Callable[[Path], None]) -> Iterator[Path]:
         yield temporary
 
 
-def delete(place: Path) -> None:
-    """Delete a file, a link or a folder, as far as it goes."""
-    shutil.rmtree(place, ignore_errors=True)
-    with suppress(OSError):
-        place.unlink()
-
-
 def delete_leftovers(folder: Path) -> None:
     """Delete what killed processes left in `folder`."""
     for place in folder.glob(TEMPORARY):
@@ -69,46 +59,26 @@ def delete_leftovers(folder: Path) -> None:
             delete(place)
 
 
-def put(temporary: Path, target: Path, *, replace: bool) -> None:
-    """Give a staged file or folder its name at one stroke.
+def put(temporary: Path, target: Path) -> None:
+    """Give a staged file or folder its name at one stroke; a folder takes the place of anything.
 
-    A folder that is replaced has the temporary name then. It is never absent where the file system
+    What a folder replaces has the temporary name then. It is never absent where the file system
     can exchange two names, as most of Linux can.
 
     Raises
     ------
-    FileExistsError
-        If something stands there and is not to be replaced.
-    FileNotFoundError
-        If what was staged is gone.
     OSError
         If it cannot be renamed.
     """
-    if replace and temporary.is_file():
-        temporary.replace(target)
-        return
-    there = os.path.lexists(target)
-    if there and not replace:
-        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(target))
     try:
-        if not _renamed(temporary, target, _EXCHANGE if there else _NOREPLACE):
+        temporary.rename(target)
+    except OSError:
+        if not (temporary.is_dir() and os.path.lexists(target)):
+            raise
+        exchange = getattr(ctypes.CDLL(None), "renameat2", None)
+        names = _HERE, os.fsencode(temporary), _HERE, os.fsencode(target)
+        if exchange is None or exchange(*names, ctypes.c_uint(_EXCHANGE)) != 0:
             aside = temporary_name(target)
-            if there:
-                target.rename(aside)
+            target.rename(aside)
             temporary.rename(target)
             delete(aside)
-    except (FileExistsError, FileNotFoundError):
-        if not (replace and os.path.lexists(temporary)):
-            raise
-        put(temporary, target, replace=replace)  # another process was quicker
-
-
-def _renamed(one: Path, other: Path, flag: int) -> bool:
-    """Rename as Linux can; False where the system or the file system cannot."""
-    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
-    names = (_HERE, os.fsencode(one), _HERE, os.fsencode(other), ctypes.c_uint(flag))
-    if rename is None or rename(*names) == 0:
-        return rename is not None
-    if (number := ctypes.get_errno()) in _CANNOT:
-        return False
-    raise OSError(number, os.strerror(number), str(other))
