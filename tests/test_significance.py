@@ -11,7 +11,6 @@ from algid.base.significance import (
     CERTAIN,
     LEVEL,
     NORMAL,
-    ONE_SIDED,
     SHARES,
     SURE,
     chance,
@@ -21,7 +20,6 @@ from algid.base.significance import (
 
 def test_limits_are_those_of_the_normal_distribution() -> None:
     assert norm.ppf(0.975) == pytest.approx(NORMAL, rel=1e-15)
-    assert norm.ppf(0.95) == pytest.approx(ONE_SIDED, rel=1e-15)
     for level in (LEVEL, CERTAIN):
         assert sigmas(level) == pytest.approx(norm.isf(level / 2), rel=1e-12)
         assert sigmas(level, sides=1) == pytest.approx(norm.isf(level), rel=1e-12)

@@ -37,8 +37,6 @@ CERTAIN = LEVEL**2
 
 NORMAL = 1.959963984540054
 """Half width of a 95 % interval in standard deviations."""
-ONE_SIDED = 1.6448536269514722
-"""Standard deviations of a bound that holds to one side 95 % of the time."""
 
 
 def level(code: str) -> float:
