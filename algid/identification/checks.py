@@ -51,7 +51,7 @@ from algid.estimators.excitation import contradicted, undriven
 from algid.estimators.fit import Fit, alone
 from algid.estimators.prediction import PredictionScore
 from algid.estimators.robust import unshrunk
-from algid.identification.by_likelihood import Fitted
+from algid.identification.by_likelihood import Fitted, finished
 from algid.identification.known import FAR, contradicting, gain_notes
 from algid.identification.passes import problem_of
 from algid.identification.recordings import Recording
@@ -77,6 +77,7 @@ from algid.model import (
 )
 from algid.notices import Notice, Remedy, has_code
 from algid.physics.effort import FRICTION
+from algid.results.verdict import wrong_length
 from algid.settings import Settings
 
 STEEL, AIR = 8000.0, 1.2  # kg/m³
@@ -271,6 +272,20 @@ def _of_length(found: Fitted) -> Iterator[Notice]:
             said.add(name)
             p_value = chance(numbers["distance"])
             yield Notice("LENGTH_CONTRADICTED", numbers=numbers | {"p_value": p_value})
+
+
+def by_free_lengths(found: Fitted) -> Fitted:
+    """The fit without its given lengths, if one is wrong: that moves k1 … k5 with the payload.
+
+    What the logs show of the payload and of both lengths takes the place of what is given.
+    """
+    wrong = list(_of_length(found))
+    if not (found.fit.shared.payload and wrong_length(wrong)):
+        return found
+    fit = finished(found.fit.with_free_lengths, found.settings)
+    for notice in wrong:
+        fit = fit.noted(replace(notice, numbers={**notice.numbers, "case": "left out"}))
+    return replace(found, fit=fit)
 
 
 def _of_arms(found: Fitted) -> Iterator[Notice]:

@@ -243,7 +243,7 @@ def _by_likelihood(
     folder: Path | None,
 ) -> Result:
     """The result of the logs, its settings with the effort that they show."""
-    from algid.identification.checks import doubted, of_effort, turn_note
+    from algid.identification.checks import by_free_lengths, doubted, of_effort, turn_note
     from algid.identification.outcome import outcome_of
     from algid.identification.prior import statement_of, with_prior
 
@@ -255,6 +255,7 @@ def _by_likelihood(
         shown, of_driver = of_effort(found.fit, settings)
         if shown != settings:
             found = doubted(_fitted(survey, shown, earlier))
+    found = by_free_lengths(found)
     if said is not None:
         found = replace(found, fit=with_prior(found.fit, said))
     survey.begin("prediction")

@@ -169,8 +169,9 @@ def torque_constants(result: Result, model: Model, role: Role, file: str) -> Flo
 
 
 def given_lengths(result: Result) -> dict[str, float]:
-    """The link lengths in m that the result was made with."""
-    return Settings.of(result.settings).lengths
+    """The link lengths in m that the result was made with: not one that it identifies instead."""
+    lengths = Settings.of(result.settings).lengths
+    return {name: lengths[name] for name in outside(lengths, result.payload)}
 
 
 def wrong_inertia(values: Mapping[str, float]) -> str | None:

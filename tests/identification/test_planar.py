@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
-from algid.arm import FloatArray
+from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.identification.identify import identify
 from algid.log import Log
 from algid.notices import of_codes
@@ -33,18 +34,29 @@ def moved(constants: FloatArray, seed: int, fastest: float = 8.0) -> Log:
     return log_of(motion, motion.tau, seed)
 
 
-@pytest.mark.parametrize("share", [0.91, 0.95, 1.0])
-def test_a_length_is_named_that_refutes_the_likelihood_and_is_short(share: float) -> None:
-    """An inertia of the payload takes up what the length lacks, and the mass would be wrong.
+@pytest.mark.parametrize(
+    ("name", "share"),
+    [*product(("l1", "l2"), (0.95, 1.03)), ("l1", 1.09), ("l2", 0.91), ("l2", 1.0)],
+)
+def test_a_wrong_length_is_named_and_no_estimate_rests_on_it(name: str, share: float) -> None:
+    """Held, it may refute the likelihood, or an inertia of the payload takes up what it lacks.
 
-    The wrong one moves the constants, and with them what they say of the right one and of the arm.
+    It moves the constants, and with them what they say of the right length and of the arm.
     """
     logs = moved(ARM.phasors(), 1, 2.0), moved(ARM.phasors(*POINT), 2, 2.0)
-    result = identify(*logs, Settings(l1=ARM.l1, l2=share * ARM.l2), report=False)
+    lengths = {"l1": ARM.l1, "l2": ARM.l2}
+    given = lengths | {name: share * lengths[name]}
+    result = identify(*logs, Settings.model_validate(given), report=False)
     named = [one.numbers["name"] for one in of_codes(result.notices, "LENGTH_CONTRADICTED")]
-    assert named == ["l2"] * (share < 1)
+    assert named == [name] * (share != 1)
     assert not of_codes(result.notices, "LOGS_APART")
     assert result.verdict.failed is bool(named)
+    truth = dict(zip(CONSTANT_NAMES, ARM.phasors(), strict=False)) | {"m_p": CARRIED}
+    if named:
+        truth |= lengths
+    else:
+        assert not set(lengths) & set(result.payload)
+    assert np.abs(distances(result, truth.values(), list(truth))).max() < CHANCE
 
 
 def test_a_log_with_a_payload_among_unloaded_ones_is_named() -> None:
