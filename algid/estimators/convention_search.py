@@ -1,7 +1,6 @@
 """Find the convention of angles and torques under which a log obeys the equations of motion.
 
-See `algid.estimators.conventions` for what each does to a log, and
-`algid.estimators.convention_sums` for the fits.
+See `algid.estimators.conventions` for what each does to a log, and for the fits.
 
 **What physics demands** (Table 1): M22 = k3 + j2 > 0, k5 > 0 and k3 k5 > k1² (M positive definite,
 by the inequality of Cauchy and Schwarz on m2 l1² ≤ k5, m2 lc2² ≤ k3), friction that brakes, k1 k2
@@ -15,7 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from math import copysign, pi, remainder
+from math import atan2, copysign, pi, remainder
 from operator import itemgetter
 
 import numpy as np
@@ -23,20 +22,34 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.base.names import evenly_spread, outside, vector
 from algid.base.significance import SURE
-from algid.estimators.convention_sums import (
-    COLUMNS,
+from algid.estimators.conventions import (
+    AS_READ,
+    MODEL,
     WINDOW,
-    ZEROED,
+    Convention,
     ConventionSums,
-    ThinnedLog,
-    holds_window,
-    moving,
     solved,
     summed,
     thinned,
 )
-from algid.estimators.conventions import AS_READ, Convention
-from algid.model import F1, F2, J2, K1, K2, K3, K4, K5, K6, K7, LARGEST_PHASE, MOMENTS, PARAMETERS
+from algid.estimators.problem import TooShortError
+from algid.model import (
+    F1,
+    F2,
+    J2,
+    K1,
+    K2,
+    K3,
+    K4,
+    K5,
+    K6,
+    K7,
+    LARGEST_PHASE,
+    MOMENTS,
+    SINE_OF,
+    SINES,
+)
+from algid.signals.segments import Segment
 
 # Hz and s: what is looked at, and what scales are sought in
 _FINE, _COARSE = (
@@ -47,9 +60,9 @@ _EACH = 10.0  # s of each of several logs, at least
 _SHORTEST = 6 * WINDOW  # of motion
 _TURNS = tuple(product((0.0, 0.5 * pi, pi, -0.5 * pi), (0.0, pi)))  # of both zeros
 _SHIFTED = 3  # conventions, of the best, whose zeros are set free
-_REACH, _SETTLED = 0.2, 1e-5  # rad, of the grid on which free zeros are sought
+_REACH, _SETTLED = 0.2, 1e-5  # rad or of a scale, of the grid on which those are sought
 _MOST_GRIDS = 100
-_GRID = np.array(list(product((0.0, -0.5, 0.5, -1.0, 1.0), repeat=2)))  # its middle first
+_GRID = (0.0, -0.5, 0.5, -1.0, 1.0)  # its middle first
 _SCALES = (0.0025, 400.0)  # from angles read in degrees that are in turns to large gears' motors
 _WIDEST = 40.0  # rad: no scale is tried under which a joint would move further
 _EXACT = [gear**way for gear in range(2, 401) for way in (1, -1)]
@@ -95,7 +108,7 @@ class Candidate:
     ----------
     family : Convention, without its zeros
     zero : those, in rad
-    names : of `ZEROED`, those that the log may determine
+    names : of the constants that the log may determine
     k : (q,), what is found for them
     covariance : (q, q), of `k`
     left : (2,), share of each recorded torque's mean square that is not explained
@@ -202,20 +215,12 @@ class Recorded:
 
     @property
     def usable(self) -> bool:
-        """True if it holds windows, of ten samples each, and its angles may be angles.
+        """True if its windows hold ten samples each, and its angles may be angles.
 
         One that spans more than any scale makes a joint's is none, as a spike of 1e6 rad is none.
         """
-        if np.ptp(self.theta, axis=1).max() > _SCALES[1] * _WIDEST or 10 * self.dt > WINDOW:
-            return False
-        return all(holds_window(self.theta.shape[1], self.dt, rate) for rate, _ in (_FINE, _COARSE))
-
-
-def judge(
-    theta: FloatArray, tau: FloatArray, dt: float, *, gravity: bool = True
-) -> Judgement | None:
-    """Try every convention on angles (2, N) in rad and torques (2, N) in N m, `dt` s apart."""
-    return judge_together([Recorded(theta, tau, dt)], gravity=gravity)
+        spans = float(np.ptp(self.theta, axis=1).max(initial=0.0))
+        return spans <= _SCALES[1] * _WIDEST and 10 * self.dt <= WINDOW
 
 
 def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgement | None:
@@ -232,7 +237,10 @@ def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgeme
     idle = {joint for joint in (1, 2) if not any(log.tau[joint - 1].any() for log in usable)}
     if len(ways) != 1 or idle - {usable[0].passive}:
         return None
-    trials = Trials(usable, gravity)
+    try:
+        trials = Trials(usable, gravity)
+    except TooShortError:
+        return None
     if trials.seconds < _SHORTEST:
         return None
     candidates = trials.unscaled()
@@ -272,14 +280,15 @@ def seconds_of_each(count: int, longest: float = _FINE[1]) -> float:
 
 
 def _least(scores: Callable[[FloatArray], FloatArray], start: FloatArray) -> FloatArray:
-    """Where a function of two angles (Z, 2) is least near `start` (2,), in rad.
+    """Where a function of points (Z, n) is least near `start` (n,).
 
     On a grid around the best point so far, which shrinks where none of its points is better. (A
     minimiser of scipy's does the same; to import it takes longer than the whole search.)
     """
     reach, best = _REACH, start
+    grid = np.array(list(product(_GRID, repeat=start.size)))
     for _ in range(_MOST_GRIDS):
-        points = best + reach * _GRID
+        points = best + reach * grid
         least = points[int(np.argmin(scores(points)))]
         if np.all(np.abs(least - best) < 0.75 * reach):
             reach *= 0.5
@@ -294,30 +303,28 @@ class Trials:
 
     def __init__(self, logs: Sequence[Recorded], gravity: bool) -> None:
         self._logs = logs
-        each = [(rate, seconds_of_each(len(logs), longest)) for rate, longest in (_FINE, _COARSE)]
         self._fine, self._coarse = (
-            moving([thinned(log.theta, log.tau, log.dt, rate, longest) for log in logs])
-            for rate, longest in each
+            [
+                thinned(log.theta, log.tau, log.dt, rate, seconds_of_each(len(logs), longest))
+                for log in logs
+            ]
+            for rate, longest in (_FINE, _COARSE)
         )
         self._read = logs[0]
-        self._names = ZEROED
-        self._free = np.eye(len(COLUMNS))[None]
-        self._turns = _TURNS
-        if not gravity:
-            weighs = np.array([PARAMETERS[name].weighs for name in COLUMNS])
-            self._names = outside(ZEROED, np.array(COLUMNS)[weighs].tolist())
-            self._free = np.delete(self._free, weighs, axis=2)
-            self._turns = _TURNS[:2]
-        self.seconds = sum(log.seconds for log in self._fine)
+        self._model = MODEL if gravity else replace(MODEL, gravity=0.0)
+        self._names = outside(self._model.names, SINES)
+        self._free = np.eye(len(self._model.names))[None]
+        self._turns = _TURNS if gravity else _TURNS[:2]
+        self._passes: dict[tuple[Convention, bool], ConventionSums] = {}
+        self.seconds = self._sums(AS_READ, self._fine).seconds
+        """How long the logs move, in s."""
         self.apart = max(APART, 2 * EVIDENCE * WINDOW / max(self.seconds, _SHORTEST))
         """By how much the scores of two distinct conventions differ."""
-        self._passes: dict[tuple[Convention, bool], list[ConventionSums]] = {}
 
     def under(self, family: Convention, *zeros: tuple[float, float]) -> list[Candidate]:
         """The candidates of a family with each of some zeros."""
         sums = self._sums(family, self._fine)
-        T = np.stack([self._place(zero) for zero in zeros])
-        c, left, covariance = solved(sums, [family], T, self._read.passive)
+        c, left, covariance = solved(sums, [family], np.stack(list(map(self._place, zeros))))
         every = zip(zeros, c, covariance, left, _merits(left).tolist(), strict=True)
         return [
             Candidate(family, zero, self._names, k, V, share, score, sums.speed)
@@ -369,15 +376,19 @@ class Trials:
         return turned
 
     def _with_phases(
-        self, families: Sequence[Convention], logs: Sequence[ThinnedLog]
+        self, families: Sequence[Convention], logs: Sequence[Segment]
     ) -> tuple[FloatArray, FloatArray]:
-        """Coefficients (F, 15) of families of the same angles, a free phase for each moment.
+        """Coefficients (F, q) of families of the same angles, a free phase for each moment.
 
         With them the shares (F, 2) that are left.
         """
-        sums = self._sums(families[0], logs)
-        c, left, _ = solved(sums, families, self._free, self._read.passive)
-        return c @ self._free[0].T, left
+        c, left, _ = solved(self._sums(families[0], logs), families, self._free)
+        return c, left
+
+    def _phase(self, c: FloatArray, moment: str) -> float:
+        """The phase in rad of a moment among the coefficients (q,), 0 of one without a column."""
+        k = dict(zip(self._model.names, c.tolist(), strict=True))
+        return atan2(k.get(SINE_OF[moment], 0.0), k.get(moment, 0.0))
 
     def bent(self) -> float | None:
         """What is left as the log was read with a phase for each moment.
@@ -385,21 +396,17 @@ class Trials:
         None where one is no phase.
         """
         (c,), left = self._with_phases([AS_READ], self._fine)
-        places = np.array(list(map(COLUMNS.index, MOMENTS)))
-        cosine, sine = c[places], c[places + 1]  # both 0 of a moment without a column
-        if np.any(np.arctan2(np.abs(sine), cosine) > LARGEST_PHASE):
+        if any(abs(self._phase(c, moment)) > LARGEST_PHASE for moment in MOMENTS):
             return None
         return float(_sizes(left)[0])
 
     def _best_zero(self, family: Convention) -> tuple[float, float]:
         """Zeros δ1 and δ2 in rad of least residual; k1, k2 and k4 are positive if determined."""
         sums, ((c,), _) = self._sums(family, self._fine), self._with_phases([family], self._fine)
-        places = np.array([COLUMNS.index(K4), COLUMNS.index(K1)])  # each with its sine part next
-        start = np.arctan2(c[places + 1], c[places])
+        start = np.array([self._phase(c, K4), self._phase(c, K1)])
 
         def scores(zeros: FloatArray) -> FloatArray:
-            T = np.stack([self._place((one, two)) for one, two in zeros.tolist()])
-            return _sizes(solved(sums, [family], T, self._read.passive)[1])
+            return _sizes(solved(sums, [family], np.stack(list(map(self._place, zeros))))[1])
 
         best = _least(scores, start)
         return remainder(float(best[0]), 2 * pi), remainder(float(best[1]), 2 * pi)
@@ -410,67 +417,62 @@ class Trials:
         None where no scale leaves far less than none.
         """
 
-        def score(scale: float, logs: Sequence[ThinnedLog]) -> float:
+        def score(scale: float, logs: Sequence[Segment] = self._fine) -> float:
             return float(_sizes(self._with_phases([_scaled_by(scale, joints)], logs)[1])[0])
+
+        def scores(points: FloatArray) -> FloatArray:
+            return np.array(list(map(score, np.exp(points[:, 0]).tolist())))
 
         travel = np.max([np.ptp(log.theta, axis=1) for log in self._coarse], axis=0)
         grid = _grid(travel[np.array(joints) == 1])
         scale = min(grid, key=lambda scale: score(scale, self._coarse))
         if score(scale, self._coarse) > score(1.0, self._coarse) - self.apart:
             return None
-        step = 1.2
-        while step > 1 + 1e-5:
-            around = [scale / step, scale / step**0.5, scale, scale * step**0.5, scale * step]
-            scale = min(around, key=lambda scale: score(scale, self._fine))
-            step = step**0.5
+        scale = float(np.exp(_least(scores, np.log([scale]))[0]))
         # a unit before a gear: what rubs leaves the scale open by a few per cent
         likely = [one for one in self._read.unit_scales if 0.5 < one / scale < 2]
         nearest = min(_EXACT, key=lambda whole: abs(scale / whole - 1))
         if abs(scale / nearest - 1) < _NEAR:
             likely.append(nearest)
-        least = score(scale, self._fine) + self.apart
-        scale = next((one for one in likely if score(one, self._fine) < least), scale)
+        least = score(scale) + self.apart
+        scale = next((one for one in likely if score(one) < least), scale)
         return _scaled_by(scale, joints)
 
-    def _place(self, zero: tuple[float, float]) -> FloatArray:
-        """T (15, q) of the zeros δ1 and δ2."""
-        T = np.zeros((len(COLUMNS), len(self._names)))
+    def _place(self, zero: Sequence[float]) -> FloatArray:
+        """T (q, p) of the zeros δ1 and δ2."""
+        T = np.zeros((len(self._model.names), len(self._names)))
         turned = {K1: zero[1], K2: zero[0] + zero[1], K4: zero[0]}
         for column, name in enumerate(self._names):
-            row = COLUMNS.index(name)
-            T[row, column] = 1.0
+            angle = turned.get(name, 0.0)
+            T[self._model.names.index(name), column] = np.cos(angle)
             if name in turned:
-                T[row : row + 2, column] = np.cos(turned[name]), np.sin(turned[name])
+                T[self._model.names.index(SINE_OF[name]), column] = np.sin(angle)
         return T
 
-    def _sums(self, family: Convention, logs: Sequence[ThinnedLog]) -> ConventionSums:
-        """Sums for a family's angles and drive, one pass for all that share them."""
+    def _sums(self, family: Convention, logs: Sequence[Segment]) -> ConventionSums:
+        """Sums for a family's angles, one pass for all that share them."""
         angles = Convention(
             swapped=family.swapped, scale=family.scale, signs=family.signs, absolute=family.absolute
         )
         key = angles, logs is self._fine
         if key not in self._passes:
-            self._passes[key] = summed(angles, logs, (0, self._read.base))
-        return self._passes[key][abs(family.base)]
+            self._passes[key] = summed(angles, logs, self._model)
+        return self._passes[key]
 
 
 def _families(read: Recorded) -> Iterator[list[Convention]]:
-    """Every convention without scale and zeros, those of the same angles and drive together.
+    """Every convention without scale and zeros, those of the same angles together.
 
     The torque of a `passive` joint has no sign, and changes places with none.
     """
-    for swapped, sign, absolute, base in product(
-        (False, True), (1, -1), (0, read.absolute), (0, read.base)
-    ):
-        angles = Convention(swapped=swapped, signs=(1, sign), absolute=absolute, base=base)
-        torques = product((False, True), (1, -1), (1, -1))
+    for swapped, sign, absolute in product((False, True), (1, -1), (0, read.absolute)):
+        angles = Convention(swapped=swapped, signs=(1, sign), absolute=absolute)
         every = []
-        for swap, one, two in torques:
-            signs = (one, two)
-            if read.passive is None or (not swap and signs[read.passive - 1] > 0):
-                every.append(replace(angles, torques_swapped=swap, torque_signs=signs))
-        if read.passive is None or not base:
-            yield every
+        for base, swap, one, two in product((0, read.base), (False, True), (1, -1), (1, -1)):
+            own = replace(angles, torques_swapped=swap, torque_signs=(one, two), base=base)
+            if not read.passive or (not (base or swap) and (one, two)[read.passive - 1] > 0):
+                every.append(own)
+        yield every
 
 
 def _scaled_by(scale: float, joints: tuple[int, int]) -> Convention:

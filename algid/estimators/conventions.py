@@ -7,11 +7,10 @@ tried: the log is mapped back and eq. (1), with friction and offsets, fitted in 
 
 **Zeros are linear.** With θ1 + δ1 and θ2 + δ2 in the place of the angles, k4 cos θ1 becomes k4 cos
 δ1 cos θ1 − k4 sin δ1 sin θ1; likewise k2 with δ1 + δ2, and k1 with δ2. Each of the three has
-therefore a second column, a quarter turn on, and one pass over the log serves every zero. Signs
-and order of the torques are linear in b. A second motor at the base turns θ1 + θ2 and does the
-work τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2): its own equations are the difference of the joints' and the
-second joint's. Only order, relative sign, reference and scale of the angles need a pass of their
-own.
+therefore a second column, a quarter turn on, and one pass over the log serves every zero. Signs,
+order and drive of the torques are linear in the torques. A second motor at the base turns θ1 + θ2
+and does the work τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2): the torque at joint 1 is the sum of both. Only order,
+relative sign, reference and scale of the angles need a pass of their own.
 
 **What no log can determine** (tests prove each):
 
@@ -24,16 +23,43 @@ own.
   and k2 themselves are positive says that link 2's centre of gravity lies on link 2's side of its
   joint, which no counterweight spoils.
 - Without gravity, every δ1.
+
+======  ==================================================================  ==================
+symbol  name                                                                shape
+======  ==================================================================  ==================
+G       products of the moments of q columns and of both torques as they    (2, q + 2, q + 2)
+        were recorded, by joint, summed over windows
+B       torques at the joints by those that were recorded                   (2, 2)
+c       coefficients under one convention's zeros                           (p,), p ≤ 12
+T       c's place among the columns, for the zeros δ1 and δ2                (q, p)
+======  ==================================================================  ==================
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import pi, remainder
 
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.base.criteria import AT_REST
+from algid.estimators import weak
+from algid.estimators.modulating_functions import OVERLAP, Windows
+from algid.estimators.problem import OF_A_WINDOW, Source, TooShortError, WeakSettings
+from algid.model import Model
+from algid.physics.terms.coulomb import COULOMB
+from algid.physics.terms.offset import OFFSET
+from algid.physics.terms.phases import PHASES
+from algid.physics.terms.rotor import ROTOR
+from algid.signals.segments import Segment
+
+MODEL = Model((COULOMB.name, OFFSET.name, ROTOR.name, PHASES.name), coulomb_speed=0.1)
+WINDOW = 0.4  # s
+_LEAST_POWER = 1e-280  # (N m)²: the square of a torque of denormal numbers is zero
+_FLOOR = 1e-9  # of a torque's power: a residual below it is rounding
 
 
 @dataclass(frozen=True)
@@ -57,19 +83,20 @@ class Convention:
 
     def angles(self, theta: FloatArray) -> FloatArray:
         """Angles (2, N) in rad under algid's convention out of those that were read."""
-        if self.swapped:
-            theta = theta[::-1]
-        first = theta[0] * (self.signs[0] / self.scale[0])
-        second = theta[1] * (self.signs[1] / self.scale[1])
-        second = second - self.absolute * first
-        return np.stack([first, second]) + np.array(self.zero)[:, None]
+        A = np.diag(np.divide(self.signs, self.scale))
+        A[1] -= self.absolute * A[0]
+        return (A[:, ::-1] if self.swapped else A) @ theta + np.array(self.zero)[:, None]
+
+    @property
+    def drive(self) -> FloatArray:
+        """B, with which `torques` at the joints are made of those that were read."""
+        B = np.diag(self.torque_signs).astype(np.float64)
+        B[0] += self.base * B[1]
+        return B[:, ::-1] if self.torques_swapped else B
 
     def torques(self, tau: FloatArray) -> FloatArray:
         """Torques (2, N) at the joints in N m out of those that were read."""
-        if self.torques_swapped:
-            tau = tau[::-1]
-        first, second = self.torque_signs[0] * tau[0], self.torque_signs[1] * tau[1]
-        return np.stack([first + self.base * second, second])
+        return self.drive @ tau
 
     def mirrored(self) -> Convention:
         """The same arm seen from behind: another convention with the same constants."""
@@ -83,3 +110,99 @@ class Convention:
 
 
 AS_READ = Convention()
+
+
+@dataclass(frozen=True, eq=False)
+class ConventionSums:
+    """Sums over the windows of logs whose angles were mapped.
+
+    G, how many windows that do not overlap it holds for each joint, the joints' RMS speeds (2,) in
+    rad/s, and how long the logs move, in s.
+    """
+
+    gram: FloatArray
+    independent: FloatArray
+    speed: FloatArray
+    seconds: float
+
+
+def thinned(theta: FloatArray, tau: FloatArray, dt: float, rate: float, longest: float) -> Segment:
+    """Means over as many samples as leave `rate` Hz, of the first `longest` s."""
+    width = max(1, round(1 / (rate * dt)))
+    count = min(theta.shape[1], round(longest / dt)) // width
+    means = [
+        signal[:, : count * width].reshape(2, count, width).mean(axis=2) for signal in (theta, tau)
+    ]
+    return Segment(0.0, width * dt, *means)
+
+
+def summed(angles: Convention, logs: Sequence[Segment], model: Model) -> ConventionSums:
+    """Sums over the windows of logs of one arm for angles so mapped.
+
+    Where a joint is slower than `AT_REST` of its RMS speed in all of them, dry friction may hold
+    it, and no equation of motion holds.
+
+    Raises
+    ------
+    TooShortError
+        If no log is long enough for a window.
+    """
+
+    def torques(piece: Segment, windows: Windows) -> FloatArray:
+        return np.stack([windows.torque_moments(piece.tau)] * 2)
+
+    mapped = [replace(log, theta=angles.angles(log.theta)) for log in logs]
+    sources: list[Source] = [partial(list, [log]) for log in mapped]
+    settings = WeakSettings(model, WINDOW)
+    speed = weak.speeds(sources, settings)
+    settings = replace(settings, rest=(AT_REST * speed[0], AT_REST * speed[1]))
+    every = [weak.normal_equations(source, settings, beside=torques) for source in sources]
+    normals = [normal for normal in every if normal is not None]
+    if not normals:
+        raise TooShortError(f"no {OF_A_WINDOW}")
+    gram = np.sum([normal.gram.sum(axis=0) for normal in normals], axis=0)
+    rows = np.stack([normal.rows for normal in normals])
+    seconds = WINDOW / OVERLAP * float(np.sum(rows.max(axis=1) + OVERLAP))
+    return ConventionSums(gram[:, :-1, :-1], rows.sum(axis=0) / OVERLAP, speed, seconds)
+
+
+def solved(
+    sums: ConventionSums, families: Sequence[Convention], T: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Weighted least squares for each of F families with each T of (Z, q, p), F Z fits.
+
+    Gives c (F Z, p), shares left (F Z, 2) and covariances (F Z, p, p). Where a joint has no torque
+    what is left is a share of what acts on it, summed over the columns, as constants near nothing
+    leave nothing of it.
+    """
+    q, p = T.shape[1:]
+    drives = np.stack([family.drive for family in families])
+    M = np.zeros((len(drives), len(T), 2, q + 2, p + 1))
+    M[..., :q, :p] = T[:, None]
+    M[..., q:, p] = drives[:, None]
+    gram = (M.swapaxes(-1, -2) @ sums.gram @ M).reshape(-1, 2, p + 1, p + 1)
+    own = np.stack([replace(family, base=0).drive for family in families])
+    power = np.einsum("faj,ajj->fa", own**2, sums.gram[:, q:, q:])
+    power = np.maximum(np.repeat(power, len(T), axis=0), _LEAST_POWER)
+    motorless = power == _LEAST_POWER
+    ridge = 1e-12 * np.eye(p)
+
+    def solve(weights: FloatArray, _: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
+        normal = np.einsum("za,zaxy->zxy", weights, gram)
+        size = np.sqrt(np.maximum(np.einsum("zii->zi", normal[:, :p, :p]), 1e-140))
+        scale = size[:, :, None] * size[:, None, :]
+        inverse = np.linalg.inv(normal[:, :p, :p] / scale + ridge) / scale
+        v = np.append(
+            -np.einsum("zij,zj->zi", inverse, normal[:, :p, p]), np.ones((len(gram), 1)), 1
+        )
+        acting = np.einsum("zaii,zi->za", gram[..., :p, :p], v[:, :p] ** 2)
+        share = np.where(motorless, np.maximum(acting, _LEAST_POWER), power)
+        squares = np.einsum("zi,zaij,zj->za", v, gram, v)
+        return -v[:, :p], np.maximum(squares, _FLOOR * share), share, inverse
+
+    def weigh(state: tuple[FloatArray, ...]) -> FloatArray:
+        return sums.independent / state[1]
+
+    start: tuple[FloatArray, ...] = (power, np.where(motorless, power[:, ::-1], power))
+    (c, squares, share, inverse), _ = weak.reweighted(weigh, solve, start)
+    return c, squares / share, inverse

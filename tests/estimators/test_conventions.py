@@ -18,7 +18,6 @@ from algid.estimators.convention_search import (
     Recorded,
     Trials,
     _families,
-    judge,
     judge_together,
 )
 from algid.estimators.conventions import AS_READ, Convention
@@ -46,7 +45,7 @@ def measured(motion: SimulatedMotion, coulomb: float = 0.02, seed: int = 0) -> P
 
 
 def judged(theta: FloatArray, tau: FloatArray) -> Judgement:
-    return judge(theta, tau, DT)
+    return judge_together([Recorded(theta, tau, DT)])
 
 
 EVERY: dict[str, Spoil] = {
@@ -216,8 +215,7 @@ def test_no_convention_that_is_passed_over_comes_nearer(bench: Bench, row: str) 
         assert one.convention in seen or one.score > best + trials.apart
 
 
-def test_logs_that_cannot_tell() -> None:
+@pytest.mark.parametrize(("dt", "pulls"), [(1e-3, 1.0), (1.0, 1.0), (0.01, 0.0)])
+def test_logs_that_cannot_tell(dt: float, pulls: float) -> None:
     theta, tau = np.random.default_rng(0).standard_normal((2, 2, 900))
-    assert judge(theta, tau, 1e-3) is None
-    assert judge(theta, tau, 1.0) is None
-    assert judge(np.repeat(theta, 10, axis=1), np.zeros((2, 9000)), 1e-3) is None
+    assert judge_together([Recorded(theta, pulls * tau, dt)]) is None

@@ -11,7 +11,7 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.base.errors import AlgidError, LogError
-from algid.estimators.convention_search import judge
+from algid.estimators.convention_search import Recorded, judge_together
 from algid.identification.identify import identify
 from algid.log import Log, Origin
 from algid.profile import Profile
@@ -79,9 +79,9 @@ def test_velocities_that_an_estimator_cannot_have_are_refused(
 @pytest.mark.parametrize("spike", [1e6, 1e29])
 def test_a_spike_in_an_angle_is_no_convention(spike: float, tmp_path: Path) -> None:
     t, theta, tau = moving(100, 10)
-    assert judge(theta, tau, 0.01) is not None
+    assert judge_together([Recorded(theta, tau, 0.01)]) is not None
     theta[0, 500] += spike
-    assert judge(theta, tau, 0.01) is None
+    assert judge_together([Recorded(theta, tau, 0.01)]) is None
     path = tmp_path / "log.parquet"
     write_log(path, log_of(t, theta, tau))
     with pytest.raises(LogError, match="DEGREES: angles reach"):
