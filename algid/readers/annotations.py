@@ -93,21 +93,20 @@ def object_in(text: str) -> dict[str, Any]:
 def _called(name: str, columns: Sequence[str]) -> list[str]:
     """The columns that a name stands for: the one so called, or those of a joint or a quantity."""
     plain = name.strip().lower()
-    for column in columns:
-        if column.lower() == plain:
-            return [column]
+    if exact := [column for column in columns if column.lower() == plain]:
+        return exact[:1]
     part = take_apart(plain)
     stems = {part.stem, part.stem.removeprefix("joint_")}
     stems |= {stem.removesuffix("s") for stem in stems}
     for known in (*STEMS.values(), TIMES) if part.joint is None else ():
         if not stems.isdisjoint(known):
             stems |= {one for one in known if (one in CURRENTS) == (part.stem in CURRENTS)}
-    found = []
-    for column in columns:
-        own = take_apart(column)
-        if own.stem in stems and part.joint in (None, own.joint):
-            found.append(column)
-    return found
+    parts = {column: take_apart(column) for column in columns}
+    return [
+        column
+        for column, own in parts.items()
+        if own.stem in stems and part.joint in (None, own.joint)
+    ]
 
 
 def lines_of(metadata: Mapping[str, str]) -> Iterator[str]:
@@ -224,13 +223,11 @@ def settings_unused(
         idle[name] = name in (*VELOCITIES, *REFERENCES) and name not in mapping
         idle[f"{name}.topic"] = by_column and bool(profile.channel(name).topic)
     idle["velocity"] = idle.get("omega1", False) and profile.velocity == "measured"
-    given = set()
-    for name in profile.model_fields_set:
-        one = getattr(profile, name)
-        # a channel's table that is empty, as a drafted profile has it, says nothing
-        if one is not None and getattr(one, "model_fields_set", True):
-            given.add(name)
-    names = [name for name, is_idle in idle.items() if is_idle and name.partition(".")[0] in given]
+    given = profile.model_dump(exclude_unset=True)
+    # a channel's table that is empty, as a drafted profile has it, says nothing
+    gone = {name for name, value in given.items() if value is None or value == {}}
+    known = given.keys() - gone
+    names = [name for name, is_idle in idle.items() if is_idle and name.partition(".")[0] in known]
     if names:
         yield Notice(
             "STATED_UNUSED",

@@ -72,8 +72,5 @@ def open_feather(path: Path) -> TableFile:
     with as_log_error("Feather"), pa.memory_map(str(path)) as source:
         schema = pa.ipc.open_file(source).schema
         names = list(schema.names)  # damaged ones are no text
-        # one column tells the rows; the others need not be unpacked for it
-        options = pa.ipc.IpcReadOptions(included_fields=[0])
-        reader = pa.ipc.open_file(source, options=options)
-        rows = sum(reader.get_batch(place).num_rows for place in range(reader.num_record_batches))
+    rows = sum(batch.num_rows for batch in batches(names[:1]))
     return TableFile("feather", schema, rows, batches)

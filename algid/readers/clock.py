@@ -257,22 +257,23 @@ class Series:
         """Median time between samples in ns."""
         return _period(self.table.stamp_ns)
 
-    def covers(self, stamps: IntArray) -> NDArray[np.bool_]:
-        """True where a stamp (N,) equals a sample's, or lies between two samples without a gap."""
-        own = self.table.stamp_ns
-        if own.size < 2:
-            return np.zeros(stamps.size, np.bool_)
-        after = np.clip(np.searchsorted(own, stamps, side="left"), 1, own.size - 1)
-        bridged = own[after] - own[after - 1] <= BRIDGED * self.period
-        at_sample = (own[after] == stamps) | (own[after - 1] == stamps)
-        return (bridged | at_sample) & (stamps >= own[0]) & (stamps <= own[-1])
+    def at(self, stamps: IntArray) -> tuple[NDArray[np.bool_], dict[str, FloatArray]]:
+        """Which stamps (N,) it covers, and the channels there, linear between samples.
 
-    def at(self, stamps: IntArray) -> dict[str, FloatArray]:
-        """The channels at the stamps (N,), linear between samples."""
-        start = self.table.stamp_ns[0]
-        own = (self.table.stamp_ns - start).astype(np.float64)
-        wanted = (stamps - start).astype(np.float64)
-        return {name: np.interp(wanted, own, values) for name, values in self.table.columns.items()}
+        Covered is what equals a sample's, or lies between two samples without a gap; the rest is
+        NaN.
+        """
+        own = self.table.stamp_ns
+        place = np.searchsorted(own, stamps)
+        after, before = np.minimum(place, own.size - 1), np.maximum(place - 1, 0)
+        inside = (own[before] <= stamps) & (stamps <= own[after])
+        covered = inside & (own[after] - own[before] <= BRIDGED * self.period)
+        covered |= own[after] == stamps
+        since, wanted = ((one - own[0]).astype(np.float64) for one in (own, stamps))
+        channels = {}
+        for name, values in self.table.columns.items():
+            channels[name] = np.where(covered, np.interp(wanted, since, values), np.nan)
+        return covered, channels
 
     def error(self) -> str:
         """Error of linear interpolation by channel: RMS of an eighth of the second differences."""
@@ -320,23 +321,20 @@ def aligned(
     """
     lost, between = 0, set[str]()
     for table in main:
-        covered = np.ones(len(table), np.bool_)
-        for other in others:
-            covered &= other.covers(table.stamp_ns)
-        kept = table.only(covered)
+        covered, columns = np.ones(len(table), np.bool_), dict(table.columns)
+        for place, other in enumerate((*others, *beside)):
+            known, channels = other.at(table.stamp_ns)
+            columns |= channels
+            if place < len(others):
+                covered &= known
+        kept = SampleTable(table.stamp_ns, columns).only(covered)
         lost += len(table) - len(kept)
-        columns = dict(kept.columns)
         for other in others:
-            columns |= other.at(kept.stamp_ns)
             own = other.table.stamp_ns
             places = np.minimum(np.searchsorted(own, kept.stamp_ns), own.size - 1)
             if not np.array_equal(own[places], kept.stamp_ns):
                 between.add(other.topic)
-        for other in beside:
-            known = other.covers(kept.stamp_ns)
-            for name, values in other.at(kept.stamp_ns).items():
-                columns[name] = np.where(known, values, np.nan)
-        yield SampleTable(kept.stamp_ns, columns)
+        yield kept
     for other in others:
         if other.topic in between:
             rate = 1e9 / other.period if other.period else 0.0

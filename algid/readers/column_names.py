@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from algid.base.limits import LIMITS
 from algid.base.text import counted
-from algid.base.units import CURRENT, is_foreign, unit_of
+from algid.base.units import is_foreign, unit_of
 from algid.readers.joints import along_the_arm
 
 
@@ -95,7 +95,6 @@ _STATE = re.compile(
     r"|(?<=[./])(?P<list>\w+)\[(?P<place>\d{1,3})\])$"
 )
 _JOINT_FIRST = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})[_./ ]+(.+)$")
-_NUMBERED = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})$")
 _COUNTED = re.compile(r"(?:^|_)(?:joint|axis|dof|actuator)(?=_|\d|$)")
 """Words that a joint's number stands beside, and that name no joint."""
 _LAST_NUMBER = re.compile(r"(?:_|\[)(\d+)\]?$")
@@ -177,22 +176,6 @@ def take_apart(column: str) -> Name:
             return Name(known, "_".join(words), unit, 2)
         break
     return Name(stem, joint, unit)
-
-
-def units_in_names(columns: Mapping[str, str], stated: Mapping[str, str]) -> dict[str, str]:
-    """By channel the unit of its column.
-
-    Its name says it, or what the file states beside it; a current without one is in amperes.
-    """
-    units = {}
-    for channel, column in columns.items():
-        name, beside = take_apart(column), stated.get(column)
-        unit = name.unit or (beside and (unit_of(beside) or beside))
-        if name.stem in CURRENTS and channel.startswith("tau") and unit not in CURRENT:
-            unit = unit if unit and unit_of(unit) is None else "A"
-        if unit:
-            units[channel] = unit
-    return units
 
 
 def on_motor_side(column: str) -> bool:
@@ -307,12 +290,9 @@ def _of_joint(of_stem: Mapping[str, str], joint: str) -> list[str]:
     So is its column, ``dof_pos_2``.
     """
     name = joint.strip().lower()
-    names = {name, _COUNTED.sub("_", name).strip("_")}
-    part = take_apart(name)
+    names, part = {name, take_apart(f"{name} position").joint or name}, take_apart(name)
     if part.joint and part.stem in _STEMS:
         names.add(part.joint)
-    if numbered := _NUMBERED.match(name):
-        names.add(numbered[1].lstrip("0") or "0")
     columns = []
     for key, column in of_stem.items():
         own = key.rpartition("/")[2]
@@ -355,12 +335,11 @@ def _only_torque(parts: Mapping[str, Name], angle: str | None) -> str | None:
 
 def time_among(columns: Iterable[str]) -> str | None:
     """The column that is a time by its name; of two alike the first one counts."""
-    plain: dict[str, str] = {}
-    bare: dict[str, str] = {}
+    found = list[tuple[bool, int, str]]()
     for column in columns:
         part = take_apart(column)
-        plain.setdefault(column.strip().strip('"').strip().lower(), column)
-        if part.joint is None:
-            bare.setdefault(part.stem, column)
-    found = [known[name] for known in (plain, bare) for name in TIMES if name in known]
-    return found[0] if found else None
+        whole = column.strip().strip('"').strip().lower()
+        for bare, name in enumerate((whole, part.stem if part.joint is None else "")):
+            if name in TIMES:
+                found.append((bare > 0, TIMES.index(name), column))
+    return min(found, key=lambda one: one[:2])[2] if found else None

@@ -13,7 +13,6 @@ from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.text import counted
 from algid.base.units import is_foreign, unit_of
-from algid.options import flag
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -134,7 +133,7 @@ def detect(head: bytes, names: Sequence[str] | None = None) -> Dialect:
             data = data[first:]
             break
     if not data:
-        raise LogError("no table in the text; expected a header and rows of numbers")
+        raise LogError("no table in the text; expected a header and rows, a line feed behind each")
     number, header = data[0]
     rows = [line for _, line in data[1:]]
     separator = _separator(header, rows[:19])
@@ -142,23 +141,18 @@ def detect(head: bytes, names: Sequence[str] | None = None) -> Dialect:
     above = [line.removeprefix(comment or "").strip() for line in lines[:number]]
     if all(_is_number(cell) for cell in columns if cell):
         skip, rows = 0, [header, *rows]
-        if names is None:  # the header may be one of the comments above
-            numbered = [f"column {place}" for place in range(1, len(columns) + 1)]
-            texts = (split(text, separator) for text in reversed(above))
-            fitting = (one for one in texts if len(one) == len(columns))
-            columns = next((one for one in fitting if not any(map(_is_number, one))), numbered)
-        elif len(names) == len(columns):
-            columns = list(names)
-        else:
-            raise LogError(
-                f"{counted(len(columns), 'column')}, and {counted(len(names), 'name')} for "
-                f"them: {', '.join(names)[:200]}; name each: {flag('columns')}"
-            )
+        # the header may be one of the comments above
+        texts = [list(names or ()), *(split(text, separator) for text in reversed(above))]
+        fitting = [one for one in texts if len(one) == len(columns)]
+        numbered = [f"column {place}" for place in range(1, len(columns) + 1)]
+        columns = next((one for one in fitting if not any(map(_is_number, one))), numbered)
     units = _units(columns, split(rows[0], separator)) if rows else {}
     if units:
         skip, rows = skip + 1, rows[1:]
     if not rows:
-        raise LogError("a header and no rows below it; expected rows of numbers")
+        raise LogError(
+            "a header and no rows below it; expected rows of numbers, a line feed behind each"
+        )
     found = [split(row, separator) for row in rows]
     if len(found[0]) != len(columns):
         raise LogError(
@@ -245,12 +239,6 @@ def _lines(head: bytes) -> list[str]:
         raise LogError("the text is UTF-16; save it as UTF-8")
     text = head.decode("utf-8-sig", errors="replace")
     lines = re.split("\r\n|\n", text)
-    for number, line in enumerate(lines, start=1):
-        if "\r" in line.rstrip("\r"):
-            raise LogError(
-                f"line {number} holds carriage returns alone, without line feeds; save it "
-                "with line feeds"
-            )
     return lines[:-1] if len(head) >= LIMITS.head_bytes else lines  # the last one may break off
 
 

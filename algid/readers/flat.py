@@ -20,7 +20,7 @@ from algid.base.arrow import whole_column
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.quantiles import median
-from algid.base.units import ANGLE, NANOSECONDS, unit_of
+from algid.base.units import ANGLE, CURRENT, NANOSECONDS, unit_of
 from algid.log import SLOWEST, IntArray, Origin, Reading, add, word_sum
 from algid.notices import Notice, Remedy
 from algid.readers.annotations import lines_of, object_in, settings_unused, stated_rate, unused
@@ -32,7 +32,6 @@ from algid.readers.column_names import (
     other_joints,
     take_apart,
     time_among,
-    units_in_names,
     words,
 )
 from algid.readers.convert import channel_readings, laws_of
@@ -143,8 +142,8 @@ def open_offered(path: str, offered: Offered, profile: Profile) -> TableReader:
     if profile.joints or (joints and not named):
         reading, order = reading_of(joints or (), profile)
         notices += order
-    units = units_in_names(sources, offered.units)
-    notices += _doubts(offered, sources, units, profile)
+    units, doubts = _units(offered, sources, profile)
+    notices += doubts
     unit = profile.time_unit or unit_of(units.pop("t", ""))
     clock = Clock(unit, unit is not None)
     if "t" not in sources:  # any column has a cell in each row that is counted
@@ -153,18 +152,15 @@ def open_offered(path: str, offered: Offered, profile: Profile) -> TableReader:
         clock = Clock("ns", True)
     elif unit is None and all(sources[name] == name for name in ("t", *profile.needed)):
         clock = Clock("s", False)  # algid's own names mean algid's own units
-
-    def look(others: Mapping[str, str]) -> Iterator[SampleTable]:
-        return offered.tables({"t": sources["t"], **others}, clock, [])
-
     angles = [sources[name] for name in ("theta1", "theta2") if name in sources]
-    others = dict[str, str]()
-    for joint, source in other_joints(fields, angles).items():
-        if fields[source].is_number and len(others) < LIMITS.other_joints:
-            others[fields[source].joint or joint] = source
+    others, places = dict[str, str](), {"t": sources["t"]}
+    for joint, source in [*other_joints(fields, angles).items()][: LIMITS.other_joints]:
+        if fields[source].is_number:
+            others[fields[source].joint or joint] = places[source] = source
     # of counts nobody knows how far they are
     angle = ANGLE.get(profile.channel("theta1").unit or units.get("theta1", "rad"))
-    notices += moving_joints(others, look, angle) if angle else ()
+    if angle and others:
+        notices += moving_joints(others, partial(offered.tables, places, clock, []), angle)
     topics = dict.fromkeys(fields[source].topic for name, source in sources.items() if name != "t")
     channels = channel_readings(mapping, profile, units)
     reading = replace(
@@ -228,42 +224,48 @@ def _naming(channels: Sequence[str]) -> Remedy:
     return Remedy({"time" if name == "t" else f"{name}.source": None for name in channels})
 
 
-def _doubts(
-    offered: Offered, sources: Mapping[str, str], units: Mapping[str, str], profile: Profile
-) -> Iterator[Notice]:
-    """What to say of commands, of units that file and user, or a name and its file, differ about.
+def _units(
+    offered: Offered, sources: Mapping[str, str], profile: Profile
+) -> tuple[dict[str, str], list[Notice]]:
+    """By channel the unit that its column's name states, or else the file beside it.
 
-    `units` are those that the file states, by channel. A user's word beats a file's.
-    Motors' signals are told where nobody tells their gear, currents where they are taken for
-    torques.
+    A current without one is in amperes. What is said: of commands, of units that file and user, or
+    a name and its file, differ about, of motors' signals whose gear nobody tells. A user's word
+    beats a file's.
 
     Raises
     ------
     LogError
         If motors' signals stand beside those of joints.
     """
+    units, told = dict[str, str](), list[Notice]()
     if take_apart(sources.get("tau1", "")).stem in COMMANDED and profile.effort != "command":
         columns = f"{sources['tau1']}, {sources['tau2']}"
-        yield Notice("COMMANDED_TORQUE", numbers={"columns": columns})
+        told.append(Notice("COMMANDED_TORQUE", numbers={"columns": columns}))
     of_joints, of_motors = list[str](), list[str]()
     for name, column in sources.items():
+        part, beside = take_apart(column), offered.units.get(column, "")
+        current = name.startswith("tau") and part.stem in CURRENTS
+        stated = part.unit or unit_of(beside) or beside
+        if current and stated not in CURRENT and (not stated or unit_of(stated)):
+            stated = "A"
+        if stated:
+            units[name] = stated
         user = profile.time_unit if name == "t" else profile.channel(name).unit
-        stated = units.get(name, "")
         unit, why = stated, "as configured"
         if not user:
-            unit, why = unit_of(offered.units.get(column, "")) or stated, "as its name says"
+            unit, why = unit_of(beside) or stated, "as its name says"
         if unit and unit != (taken := user or stated):
             numbers = {"case": "stated", "column": column, "name": name, "unit": unit}
-            yield Notice("OTHER_UNIT", numbers={**numbers, "taken": taken, "why": why})
+            told.append(Notice("OTHER_UNIT", numbers={**numbers, "taken": taken, "why": why}))
         if name not in JOINT_CHANNELS:
             continue
-        current = name.startswith("tau") and take_apart(column).stem in CURRENTS
         if offered.fields[column].topic or not on_motor_side(column):
             of_joints.append(name)
         elif not (current or "gear_ratio" in profile.channel(name).model_fields_set):
             of_motors.append(name)
     if not of_motors:
-        return
+        return units, told
     named = ", ".join(f"{name} ({sources[name]})" for name in of_motors)
     gears = Remedy(
         {f"{name}.gear_ratio": None for name in of_motors},
@@ -271,7 +273,8 @@ def _doubts(
     )
     if of_joints:
         raise LogError(f"{named}: signals of motors beside those of joints; {gears}")
-    yield Notice("OTHER_UNIT", numbers={"case": "motor", "columns": named}, remedies=(gears,))
+    numbers = {"case": "motor", "columns": named}
+    return units, [*told, Notice("OTHER_UNIT", numbers=numbers, remedies=(gears,))]
 
 
 def samples(

@@ -24,39 +24,12 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
 _FROM_BASE_TO_TIP = (
-    ("base", "root", "waist"),
-    (
-        "shoulder",
-        "upperarm",
-        "upper_arm",
-        "hip",
-        "thigh",
-        "proximal",
-        "inner",
-        "boom",
-        "first",
-        "primary",
-        "pan",
-    ),
-    (
-        "elbow",
-        "forearm",
-        "lowerarm",
-        "lower_arm",
-        "fore_arm",
-        "knee",
-        "shank",
-        "distal",
-        "outer",
-        "stick",
-        "second",
-        "secondary",
-        "tilt",
-    ),
-    ("wrist", "ankle", "hand", "foot", "tip", "bucket", "third"),
+    "base root waist",
+    "shoulder upperarm upper_arm hip thigh proximal inner boom first primary pan",
+    "elbow forearm lowerarm lower_arm fore_arm knee shank distal outer stick second secondary tilt",
+    "wrist ankle hand foot tip bucket third",
 )
-
-_RANKS = {word: rank for rank, words in enumerate(_FROM_BASE_TO_TIP) for word in words}
+_RANKS = {word: rank for rank, words in enumerate(_FROM_BASE_TO_TIP) for word in words.split()}
 _LETTERS = {"a": 1, "b": 2, "i": 1, "ii": 2, "one": 1, "two": 2}
 
 
@@ -98,32 +71,24 @@ def reading_of(names: Sequence[str], profile: Profile) -> tuple[Reading, tuple[N
 def _ranks(first: str, second: str) -> tuple[int, int] | None:
     """Comparable places of the two names along the arm; None where the names do not tell."""
     words, others = _words(first), _words(second)
-    if len(words) == len(others):
-        differing = [pair for pair in zip(words, others, strict=True) if pair[0] != pair[1]]
-        if len(differing) == 1:
-            one, other = differing[0]
-            if one.isdecimal() and other.isdecimal():
-                return int(one), int(other)
-            if one in _LETTERS and other in _LETTERS:
-                return _LETTERS[one], _LETTERS[other]
-    place, beside = _place(words), _place(others)
-    if place == beside:
+    differing = [pair for pair in zip(words, others, strict=False) if pair[0] != pair[1]]
+    if len(words) == len(others) and len(differing) == 1:
+        one, other = differing[0]
+        if one.isdecimal() and other.isdecimal():
+            return int(one), int(other)
+        if one in _LETTERS and other in _LETTERS:
+            return _LETTERS[one], _LETTERS[other]
+    places = [_place(words), _place(others)]
+    if places[0] == places[1] or (None in places and 0 not in places):
         return None
-    if place is not None and beside is not None:
-        return place, beside
-    if place == 0:  # a base comes before anything
-        return 0, 1
-    if beside == 0:
-        return 1, 0
-    return None
+    first_place, second_place = (1 if one is None else one for one in places)  # behind a base
+    return first_place, second_place
 
 
 def _place(words: Sequence[str]) -> int | None:
     """What the first word, or pair of words, that stands for a place on an arm says."""
-    for word in [*map("_".join, pairwise(words)), *words]:
-        if word in _RANKS:
-            return _RANKS[word]
-    return None
+    known = [word for word in (*map("_".join, pairwise(words)), *words) if word in _RANKS]
+    return _RANKS[known[0]] if known else None
 
 
 def _words(name: str) -> list[str]:
@@ -138,36 +103,29 @@ LOOKED = 1 << 14
 
 
 def moving_joints(
-    positions: Mapping[str, str],
-    tables: Callable[[Mapping[str, str]], Iterator[SampleTable]],
-    unit: float,
-) -> tuple[Notice, ...]:
+    positions: Mapping[str, str], tables: Callable[[], Iterator[SampleTable]], unit: float
+) -> Iterator[Notice]:
     """Say which of the other joints of a log move, and how far, in its first table.
 
     Where they move, the two-link model lacks their torque. `positions` has by joint the name of
-    its angle, in `unit` rad; `tables` reads such fields by channel.
+    its angle, in `unit` rad; `tables` reads them.
     """
     table, moved = None, dict[str, float]()
     with suppress(LogError):  # the joints that are read tell of what is wrong
-        looked = tables({place: place for place in positions.values()}) if positions else iter(())
-        table = next(filter(len, looked), None)
+        table = next(filter(len, tables()), None)
     if table is None:
-        return ()
+        return
     for joint, place in positions.items():
         values = table.columns[place][:LOOKED]
         finite = values[np.isfinite(values)]
         if finite.size and unit * np.ptp(finite) > BESIDE_STILL:
             moved[joint] = unit * float(np.ptp(finite))
     if not moved:
-        return ()
+        return
     furthest = sorted(moved, key=lambda joint: -moved[joint])
     listed = joined([f"{joint} by {moved[joint]:.2g} rad" for joint in furthest], _NAMED)
-    swing = max(moved.values()) > SWINGING
-    numbers = {
-        "count": len(moved),
-        "joints": listed,
-        "samples": min(len(table), LOOKED),
-        "swing": swing,
-    }
+    swing = moved[furthest[0]] > SWINGING
     remedies = (nevertheless("OTHER_JOINTS"),) if swing else ()
-    return (Notice("OTHER_JOINTS", numbers=numbers, remedies=remedies),)
+    numbers = {"count": len(moved), "joints": listed, "swing": swing}
+    numbers["samples"] = min(len(table), LOOKED)
+    yield Notice("OTHER_JOINTS", numbers=numbers, remedies=remedies)

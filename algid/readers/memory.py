@@ -51,6 +51,8 @@ _OF_ANY_LOG = ("accept", "effort", "end", "gravity", "prior", "prior_error", "st
 """What it may say of a log that was read by a profile before."""
 _OF_A_CHANNEL = ("counts", "gear_ratio", "offset", "sign", "torque_constant", "unit", "unwrap")
 
+_MAKE = "algid.Log.from_arrays makes a log of times in s and plain numbers"
+
 
 def checked(log: Log) -> Log:
     """The log, if its arrays are as `Log` has them.
@@ -61,25 +63,17 @@ def checked(log: Log) -> Log:
         If there are fewer than two samples, stamps are no integers that increase, or an array
         holds anything but finite numbers in double precision.
     """
-    name, stamps = log.origin.path, log.stamp_ns
+    stamps, wrong = log.stamp_ns, ""
     if stamps.size < 2:
-        raise LogError(f"{name}: expected two samples or more, found {stamps.size}; record longer")
-    if stamps.dtype != np.int64 or not np.all(stamps[1:] > stamps[:-1]):
-        raise LogError(
-            f"{name}: stamp_ns: expected increasing integers (int64, ns), found {stamps.dtype}; "
-            "algid.Log.from_arrays takes times in s"
-        )
+        wrong = f"expected two samples or more, found {stamps.size}; record longer"
+    elif stamps.dtype != np.int64 or not np.all(stamps[1:] > stamps[:-1]):
+        wrong = f"stamp_ns: expected increasing integers (int64, ns), found {stamps.dtype}; {_MAKE}"
     for channel in ("theta", "tau", "omega"):
         values = getattr(log, channel)
-        if values is None:
-            continue
-        if values.dtype != np.float64:
-            raise LogError(
-                f"{name}: {channel}: expected float64, found {values.dtype}; "
-                "algid.Log.from_arrays converts"
-            )
-        if not np.all(np.isfinite(values)):
-            raise LogError(f"{name}: {channel}: expected finite numbers; leave other samples out")
+        if not (values is None or (values.dtype == np.float64 and np.isfinite(values).all())):
+            wrong = f"{channel}: expected finite float64, its type is {values.dtype}; {_MAKE}"
+    if wrong:
+        raise LogError(f"{log.origin.path}: {wrong}")
     return log
 
 

@@ -197,12 +197,12 @@ def cells_of(table: TableFile) -> dict[str, Cell]:
             frame = pl.DataFrame(next(table.batches(nested), none))
     metadata = table.metadata
     label, joints = _spoken(table)
+    fills = {key.lower(): value for key, value in metadata.items() if key.lower() in _FILLS}
     cells: dict[str, Cell] = {}
     for one in table.schema:
-        beside = object_in(metadata.get(one.name, ""))
-        own = decoded(one.metadata) | {key: str(value) for key, value in beside.items()}
-        said = {key.lower(): value for key, value in metadata.items() if key.lower() in _FILLS}
-        said |= {key.lower(): value for key, value in own.items()}
+        own = decoded(one.metadata) | object_in(metadata.get(one.name, ""))
+        own = {key.lower(): str(value) for key, value in own.items()}
+        said = fills | own
         if one.name == label:
             continue
         if joints and is_list(one.type) and _is_quantity(one.name):

@@ -55,24 +55,19 @@ def open_with_torque_file(
             f"folder; {Remedy({'torque_file': None}, 'name it')}"
         )
     angles = open_one(log, profile.half("theta", "omega", "q_des"))
-    wanted = angles.origin.reading.joints
     with during("opening", other):
-        stated = profile.time or profile.topic  # else nobody asks what the file has
-        names = {entry.name for entry in entries_at(other)} if stated else set[str]()
-        of_angles = {"columns": None}
-        for key in ("time", "topic"):
-            if getattr(profile, key) not in names:
-                of_angles[key] = None
-        half = profile.half("tau").model_copy(update=of_angles)
-        torques = open_one(other, half)
-        there = torques.origin.reading.joints
-        if wanted and there and wanted != there and set(wanted) == set(there):
-            torques = open_one(other, half.model_copy(update={"joints": wanted}))
+        # what is named may be the angles' alone; where nothing is, nobody asks what the file has
+        names = {one.name for one in entries_at(other)} if profile.time or profile.topic else ()
+        own = {key: None for key in ("time", "topic") if getattr(profile, key) not in names}
+        torques = open_one(other, profile.half("tau").model_copy(update={"columns": None, **own}))
+        wanted, there = (one.origin.reading.joints or () for one in (angles, torques))
+        if wanted != there and set(wanted) == set(there):
+            named = Remedy({"joints": list(wanted)}, "name both")
+            raise LogError(f"its joints stand in another order than those of the log; {named}")
 
     def tables(told: list[Notice]) -> Iterator[SampleTable]:
-        mapping = torques.origin.mapping
         with during("reading", other):
-            series = whole_topic(other.name, mapping, torques.tables(told), told)
+            series = whole_topic(other.name, torques.origin.mapping, torques.tables(told), told)
         first, last = series.table.stamp_ns[[0, -1]]
 
         def within() -> Iterator[SampleTable]:
@@ -88,18 +83,16 @@ def open_with_torque_file(
         return aligned(within(), [series], told)
 
     # where each channel of both comes from, and how it was read
-    theirs = torques.origin.mapping.items()
-    sources = {name: f"{other.name}: {one}" for name, one in theirs if name != "t"}
-    channels = dict(angles.origin.reading.channels)
-    for name, channel in torques.origin.reading.channels.items():
-        own = sources[name] if channel.factor else channel.source
-        channels[name] = replace(channel, source=own)
+    mapping, reading = dict(angles.origin.mapping), angles.origin.reading
+    channels, theirs = dict(reading.channels), torques.origin.reading
+    for name, channel in theirs.channels.items():
+        mapping[name] = f"{other.name}: {torques.origin.mapping[name]}"
+        channels[name] = replace(
+            channel, source=mapping[name] if channel.factor else channel.source
+        )
     reading = replace(
-        angles.origin.reading,
-        channels=channels,
-        topics=angles.origin.reading.topics + torques.origin.reading.topics,
-        torque_file=str(other),
+        reading, channels=channels, topics=reading.topics + theirs.topics, torque_file=str(other)
     )
-    origin = replace(angles.origin, mapping=angles.origin.mapping | sources, reading=reading)
+    origin = replace(angles.origin, mapping=mapping, reading=reading)
     notices = angles.notices + torques.notices
     return TableReader(origin, tables, notices, angles.rows, laws=angles.laws)

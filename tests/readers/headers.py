@@ -14,14 +14,14 @@ from algid.readers.log_reader import TableReader as TableReader
 
 
 def opened(
-    columns: Iterable[str],
+    columns: str | Iterable[str],
     settings: Mapping[str, Any] | None = None,
     units: Mapping[str, str] | None = None,
 ) -> TableReader:
     """A log of two samples with such columns, and what the file states of their units."""
     stated = units or {}
     fields = []
-    for name in columns:
+    for name in columns.split() if isinstance(columns, str) else columns:
         metadata = {"unit": stated[name]} if name in stated else None
         fields.append(pa.field(name, pa.float64(), metadata=metadata))
     values = [pa.array(np.arange(2) * 1e-3)] * len(fields)

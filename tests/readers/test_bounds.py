@@ -12,8 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 
 from algid.base.errors import LogError
@@ -24,21 +22,6 @@ from algid.writers import write_log
 from pipelines.mutations import clean_log
 from tests.conftest import Limited
 from tests.readers.logs import same
-
-COLUMNS = ("t", "theta1", "theta2", "tau1", "tau2")
-ROWS = [f"{row / 100},{row % 7},{row % 5},{row % 3},{row % 2}" for row in range(300)]
-
-
-def csv(folder: Path, *lines: str) -> Path:
-    path = folder / "log.csv"
-    path.write_text("\n".join([*lines, ""]))
-    return path
-
-
-def parquet(folder: Path, **beside: object) -> Path:
-    table = pa.table({name: [row * 0.01 for row in range(300)] for name in COLUMNS} | beside)
-    pq.write_table(table, folder / "log.parquet")
-    return folder / "log.parquet"
 
 
 def test_a_name_beyond_the_bound_is_its_own_stem(limited: Limited) -> None:

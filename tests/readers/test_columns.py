@@ -23,19 +23,11 @@ PLAIN = "t q1 q2 tau1 tau2"
 CONSTANTS = {"tau1": {"torque_constant": 1.0}, "tau2": {"torque_constant": 1.0}}
 
 
-def assigned(header: str, settings: dict[str, Any] | None = None, **stated: str) -> TableReader:
-    return opened(header.split(), settings, stated)
-
-
-def chosen(columns: list[str], **settings: Any) -> dict[str, str]:
+def chosen(columns: str | list[str], **settings: Any) -> dict[str, str]:
     return dict(opened(columns, settings).origin.mapping)
 
 
-def refusal(header: str, settings: dict[str, Any] | None = None, **stated: str) -> str:
-    return refused(header.split(), settings, stated)
-
-
-def refused(columns: list[str], *more: Any) -> str:
+def refused(columns: str | list[str], *more: Any) -> str:
     with pytest.raises(LogError) as error:
         opened(columns, *more)
     return str(error.value).removeprefix("log: ")
@@ -89,11 +81,11 @@ def test_columns_that_were_written_must_be_there() -> None:
 def test_a_joint_without_motor_needs_no_torque(passive: int) -> None:
     driven = 3 - passive
     for torque in (f"tau{driven}", "torque"):
-        found = assigned(f"t q1 q2 {torque}", {"passive": passive})
+        found = opened(f"t q1 q2 {torque}", {"passive": passive})
         assert found.origin.mapping[f"tau{driven}"] == torque
         assert found.origin.mapping[f"tau{passive}"] == torque
-    assert "no column for tau1, tau2" in refusal(f"t q1 q2 tau{driven}")
-    assert "no column for tau" in refusal(
+    assert "no column for tau1, tau2" in refused(f"t q1 q2 tau{driven}")
+    assert "no column for tau" in refused(
         "t q1 q2 tau7 tau8 tau9".replace("tau8 tau9", ""), {"passive": passive}
     )
 
@@ -103,7 +95,7 @@ def said(found: TableReader) -> list[tuple[str, str]]:
 
 
 def test_commanded_torques_are_told_and_taken_last() -> None:
-    commanded = assigned("t q1 q2 tau_cmd1 tau_cmd2 i_q1 i_q2")
+    commanded = opened("t q1 q2 tau_cmd1 tau_cmd2 i_q1 i_q2")
     columns = {"columns": "tau_cmd1, tau_cmd2"}
     assert commanded.notices == (Notice("COMMANDED_TORQUE", numbers=columns),)
 
@@ -112,7 +104,7 @@ def test_currents_are_in_amperes_unless_their_unit_is_told() -> None:
     header = "t q1 q2 current_1 current_2"
 
     def units(**stated: str) -> list[str]:
-        channels = assigned(header, CONSTANTS, **stated).origin.reading.channels
+        channels = opened(header, CONSTANTS, stated).origin.reading.channels
         return [channels[name].unit for name in ("tau1", "tau2")]
 
     assert units() == ["A", "A"]
@@ -159,38 +151,38 @@ def test_the_file_and_the_user_differ_about_a_unit(
     header: str, settings: dict[str, Any], stated: dict[str, str], words: str
 ) -> None:
     text = f"the file states the unit {words}"
-    assert said(assigned(header, settings, **stated)) == [("OTHER_UNIT", text)]
+    assert said(opened(header, settings, stated)) == [("OTHER_UNIT", text)]
 
 
 def test_the_unit_in_the_name_of_a_column_that_a_user_names_is_used() -> None:
-    found = assigned("t q1 q2 a_deg tau1 tau2", {"theta1": {"source": "a_deg"}})
+    found = opened("t q1 q2 a_deg tau1 tau2", {"theta1": {"source": "a_deg"}})
     assert found.origin.reading.channels["theta1"].unit == "deg"
-    assert "is in 'v'; expected one of N m," in refusal(
+    assert "is in 'v'; expected one of N m," in refused(
         "t q1 q2 x[V] tau1 tau2", {"tau1": {"source": "x[V]"}}
     )
 
 
 def test_a_unit_of_no_joint_is_refused_where_it_counts() -> None:
-    assert refusal("t q1_inch q2 tau1 tau2") == (
+    assert refused("t q1_inch q2 tau1 tau2") == (
         "the column 'q1_inch' for theta1 is in 'inch'; expected one of rad, mrad, deg, rev, rpm, "
         "counts; say its unit if that is wrong: --set theta1.unit=rad"
     )
-    assert "--set 'tau2.unit=\"N m\"'" in refusal(PLAIN, None, tau2="%")
-    assert said(assigned("t q1_inch q2 q_b tau1 tau2", {"theta1": {"source": "q_b"}})) == []
-    assert said(assigned(PLAIN, None, t="%")) == []
+    assert "--set 'tau2.unit=\"N m\"'" in refused(PLAIN, None, {"tau2": "%"})
+    assert said(opened("t q1_inch q2 q_b tau1 tau2", {"theta1": {"source": "q_b"}})) == []
+    assert said(opened(PLAIN, None, {"t": "%"})) == []
 
 
 def test_motors_beside_joints_need_a_gear() -> None:
-    told = refusal("t q1 q2 motor1_torque motor2_torque", {"tau2": {"gear_ratio": 1}})
+    told = refused("t q1 q2 motor1_torque motor2_torque", {"tau2": {"gear_ratio": 1}})
     assert told == (
         "tau1 (motor1_torque): signals of motors beside those of joints; tell the gear, turns of "
         "the motor in one of "
         "the joint, 1 for a direct drive: --set tau1.gear_ratio=N"
     )
-    motors = assigned("t motor1_pos motor2_pos motor1_torque motor2_torque")
+    motors = opened("t motor1_pos motor2_pos motor1_torque motor2_torque")
     assert [code for code, _ in said(motors)] == ["OTHER_UNIT"]
     # a current's constant tells of its gear
-    assert said(assigned("t q1 q2 motor1_current motor2_current", CONSTANTS)) == []
+    assert said(opened("t q1 q2 motor1_current motor2_current", CONSTANTS)) == []
 
 
 @pytest.mark.parametrize(
@@ -285,4 +277,4 @@ def test_names_of_the_field_are_recognised(header: str) -> None:
 
 def test_torques_of_other_joints_are_not_taken() -> None:
     with pytest.raises(LogError, match="no column for tau2; found"):
-        opened(["t", "q1", "q2", "tau2", "tau9"])
+        opened("t q1 q2 tau2 tau9")

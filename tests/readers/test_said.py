@@ -25,8 +25,8 @@ ROWS = [f"{row / 100},{row % 7},{row % 5},{row % 3},{row % 4}" for row in range(
 STATES = [json_state(one) for one in sent(LOG)]
 
 
-def csv(folder: Path, *rows: str, name: str = "log.csv") -> Path:
-    path = folder / name
+def csv(folder: Path, *rows: str) -> Path:
+    path = folder / "log.csv"
     path.write_text("\n".join(rows))
     return path
 
@@ -67,21 +67,11 @@ def test_a_table_of_lists_without_rows_is_refused(tmp_path: Path) -> None:
         read_log(tmp_path / "log.parquet")
 
 
-def test_sources_of_a_log_and_of_torques_beside_it_are_named(tmp_path: Path) -> None:
-    angles = csv(tmp_path, *(",".join(row.split(",")[:3]) for row in (HEAD, *ROWS)))
-    picked = [",".join(row.split(",")[slice(0, None, 3)]) for row in (HEAD, *ROWS)]
-    torques = csv(
-        tmp_path,
-        *(f"{a},{b.split(',')[4]}" for a, b in zip(picked, (HEAD, *ROWS), strict=True)),
-        name="torques.csv",
-    )
-    found = read_log(angles, Profile(torque_file=str(torques)))
-    assert found.origin.mapping["t"] == "t"
-    assert found.origin.mapping["tau1"] == "torques.csv: tau1"
-    assert found.origin.reading.joints_told == "names"
+def test_joints_whose_columns_are_all_named_are_the_users(tmp_path: Path) -> None:
+    path = csv(tmp_path, HEAD, *ROWS)
+    assert read_log(path).origin.reading.joints_told == "names"
     told = {name: {"source": name} for name in HEAD.split(",")[1:]}
-    whole = read_log(csv(tmp_path, HEAD, *ROWS), Profile(**told))  # type: ignore[arg-type]
-    assert whole.origin.reading.joints_told == "profile"
+    assert read_log(path, Profile(**told)).origin.reading.joints_told == "profile"  # type: ignore[arg-type]
 
 
 def test_channels_are_listed_by_their_topics(tmp_path: Path) -> None:

@@ -58,7 +58,6 @@ def dated(day: str) -> list[str]:
 
 QUOTES = r"past row \d+: .*(quotes|malformed)|row 501 .* quotes"
 DAYS = ("0001-01-01", "1677-09-21", "2262-04-12", "9999-12-31")
-QUOTED = HEAD.replace(",", '","')
 NULS = [*ROWS[:500], "\0" * 500, *ROWS[500:]]
 REFUSED: list[tuple[list[str], str]] = [
     *((noted(quoted, False), QUOTES) for quoted in ('"x', 'a"b', '"')),
@@ -70,8 +69,7 @@ REFUSED: list[tuple[list[str], str]] = [
         [",".join(f"c{place}" for place in range(5_000)), "1," * 4_999 + "1"],
         "more than 4096 columns",
     ),
-    (["\r".join([HEAD, *ROWS[:30]])], "carriage returns alone"),
-    (["\r".join([f'"{QUOTED}"', *ROWS[:30]])], "carriage returns alone"),
+    (["\r".join([HEAD, *ROWS[:30]])], "a header and no rows below it; .* a line feed behind each"),
     ([HEAD, ROWS[0], "0.1,1,x,3,4", ROWS[2]], r"could not parse `x` .* column '3: theta2'"),
     ([HEAD, ROWS[0], "0.1,1,2,3,4,5", ROWS[2]], "row 2 has more cells"),
     (["t,theta1,theta1,tau1,tau2", ROWS[0]], "twice"),
@@ -174,5 +172,7 @@ def test_columns_of_a_table_without_a_header_are_named(tmp_path: Path) -> None:
     assert "no column for t, theta1, theta2, tau1, tau2; found 'column 1', 'co" in seen.refused
     assert """as --set 'columns=["t", "theta1", "theta2", "tau1", "tau2"]'""" in seen.refused
     assert np.array_equal(read_log(path, Profile(columns=NAMES)).theta, LOG.theta)
-    with pytest.raises(LogError, match=r"5 columns, and 2 names for them: t, q1; name each"):
+    with pytest.raises(
+        LogError, match=r"no column for t, .*; found 'column 1', .* as --set 'columns="
+    ):
         read_log(path, Profile(columns=("t", "q1")))
