@@ -90,14 +90,9 @@ EXPLAINED = 0.2
 """A convention that leaves more than this share of a torque explains nothing."""
 
 
-def _merits(left: FloatArray) -> FloatArray:
-    """Scores (…) of what is left of both torques (…, 2), where a share below `LEAST` is none."""
-    return _sizes(np.maximum(left, LEAST))
-
-
-def _sizes(left: FloatArray) -> FloatArray:
-    """Sums of logarithms (…) of what is left of both torques (…, 2)."""
-    return np.asarray(np.log(left).sum(axis=-1))
+def _score(left: FloatArray, least: float = 0.0) -> FloatArray:
+    """Sums of logarithms (…) of what is left of both torques (…, 2), no share below the `least`."""
+    return np.asarray(np.log(np.maximum(left, least)).sum(axis=-1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -325,7 +320,7 @@ class Trials:
         """The candidates of a family with each of some zeros."""
         sums = self._sums(family, self._fine)
         c, left, covariance = solved(sums, [family], np.stack(list(map(self._place, zeros))))
-        every = zip(zeros, c, covariance, left, _merits(left).tolist(), strict=True)
+        every = zip(zeros, c, covariance, left, _score(left, LEAST).tolist(), strict=True)
         return [
             Candidate(family, zero, self._names, k, V, share, score, sums.speed)
             for zero, k, V, share, score in every
@@ -348,7 +343,7 @@ class Trials:
         bounds: list[tuple[float, Convention]] = []
         for families in _families(self._read):
             left = self._with_phases(families, self._fine)[1]
-            bounds += zip(_merits(left).tolist(), families, strict=True)
+            bounds += zip(_score(left, LEAST).tolist(), families, strict=True)
         found = self.under(AS_READ, AS_READ.zero)
         for place, (bound, family) in enumerate(sorted(bounds, key=itemgetter(0))):
             lawful = [one.score for one in found if not one.broken]
@@ -398,7 +393,7 @@ class Trials:
         (c,), left = self._with_phases([AS_READ], self._fine)
         if any(abs(self._phase(c, moment)) > LARGEST_PHASE for moment in MOMENTS):
             return None
-        return float(_sizes(left)[0])
+        return float(_score(left)[0])
 
     def _best_zero(self, family: Convention) -> tuple[float, float]:
         """Zeros δ1 and δ2 in rad of least residual; k1, k2 and k4 are positive if determined."""
@@ -406,7 +401,7 @@ class Trials:
         start = np.array([self._phase(c, K4), self._phase(c, K1)])
 
         def scores(zeros: FloatArray) -> FloatArray:
-            return _sizes(solved(sums, [family], np.stack(list(map(self._place, zeros))))[1])
+            return _score(solved(sums, [family], np.stack(list(map(self._place, zeros))))[1])
 
         best = _least(scores, start)
         return remainder(float(best[0]), 2 * pi), remainder(float(best[1]), 2 * pi)
@@ -418,7 +413,7 @@ class Trials:
         """
 
         def score(scale: float, logs: Sequence[Segment] = self._fine) -> float:
-            return float(_sizes(self._with_phases([_scaled_by(scale, joints)], logs)[1])[0])
+            return float(_score(self._with_phases([_scaled_by(scale, joints)], logs)[1])[0])
 
         def scores(points: FloatArray) -> FloatArray:
             return np.array(list(map(score, np.exp(points[:, 0]).tolist())))

@@ -58,7 +58,7 @@ from algid.estimators.combine import (
     scaled_pinv,
 )
 from algid.estimators.fit import Fit, finish
-from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
+from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.model import Model, advanced, inertia
@@ -156,24 +156,9 @@ def evidence(
             return None
         for sums, count in zip(grams, (rows - lost).tolist(), strict=True):
             if count:
-                logs.append(replace(projected(sums.values(), count, c, kind), c0=c0))
+                log = weak.evidence(sums.values(), count, c, kind, every=_STRIDE)
+                logs.append(replace(log, c0=c0))
     return logs
-
-
-def projected(gram: FloatArray, rows: int, c: FloatArray, loaded: bool) -> LogInformation:
-    """A log's likelihood projected on the instruments, weighed by its residual at `c` (q,).
-
-    `gram` is that of so many `rows`, as in the module's table.
-    """
-    q = c.size
-    v = np.concatenate([np.zeros(q), -c, [1.0]])
-    weights = row_weights(gram.sum(axis=0), v, rows)
-    # Overlapping rows repeat each other: a window's worth of rows counts as two.
-    gram = np.einsum("a,baxy->bxy", weights * (2.0 * _STRIDE / OVERLAP), gram)
-    A, V = gram[:, :q, q : 2 * q], gram[:, :q, :q].sum(axis=0)
-    projection = A.sum(axis=0).T @ scaled_pinv(V)
-    scores = gram[:, :q, -1] - A @ c
-    return LogInformation(loaded, c, projection @ A, scores @ projection.T)
 
 
 _Piece = tuple[int, Segment, Windows]

@@ -375,19 +375,15 @@ def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> Floa
     the better it is solved the more it would weigh: its residual counts as `MOTORLESS` of the
     other's at least.
     """
-    flat = gram.reshape(-1, gram.shape[-1] ** 2)
-
-    def squared(flat: FloatArray, v: FloatArray) -> FloatArray:
-        outer = (v[..., :, None] * v[..., None, :]).reshape(*v.shape[:-1], -1)
-        return np.asarray(outer @ flat.T).reshape(*v.shape[:-1], *gram.shape[:-2])
-
-    rounding = ROUNDINGS * EPS * squared(np.abs(flat), np.abs(v))
-    squares = np.maximum(squared(flat, v), rounding)
+    V = np.atleast_2d(v).T
+    least = ROUNDINGS * EPS * np.sum(np.abs(V) * (np.abs(gram) @ np.abs(V)), axis=-2)
+    squares = np.moveaxis(np.maximum(np.sum(V * (gram @ V), axis=-2), least), -1, 0)
+    squares = squares.reshape(v.shape[:-1] + squares.shape[1:])
     driven = gram[..., -1, -1] > 0
     alone = np.sum(driven, axis=-1, keepdims=True) == 1
     each = np.where(driven, squares / np.maximum(rows, 1), 0.0)
-    least = MOTORLESS**2 * each.max(axis=-1, keepdims=True) * rows
-    squares = np.where(alone & ~driven, np.maximum(squares, least), squares)
+    of_motorless = MOTORLESS**2 * each.max(axis=-1, keepdims=True) * rows
+    squares = np.where(alone & ~driven, np.maximum(squares, of_motorless), squares)
     torque = gram[..., -1, -1].max(axis=-1, keepdims=True)
     return np.asarray(rows / np.maximum(squares, 1e-24 * torque + 1e-300))
 

@@ -153,24 +153,19 @@ def solve_scaled(matrix: FloatArray, rhs: FloatArray) -> tuple[FloatArray, Float
     def scale(sizes: FloatArray) -> FloatArray:
         return 1 / np.where(sizes > 0, sizes, 1.0)
 
-    def norm(matrix: FloatArray) -> FloatArray:
-        return np.asarray(np.abs(matrix).sum(axis=-2).max(axis=-1))
-
     p = np.moveaxis(matrix, (0, 1), (-2, -1))
     row = scale(np.abs(p).max(axis=-1, keepdims=True))
     p = p * row
     column = scale(np.abs(p).max(axis=-2, keepdims=True))
     p = p * column
     q = np.moveaxis(rhs, 0, -1)[..., None] * row
+    condition = np.linalg.cond(p, 1)
+    regular = (condition <= LARGEST_CONDITION)[..., None, None]
     # windows start with rows of zeros; LAPACK refuses a whole batch for one zero pivot
-    regular = np.asarray(np.linalg.slogdet(p).sign != 0)
-    inverse = np.linalg.inv(np.where(regular[..., None, None], p, np.eye(p.shape[-1])))
-    # next to singular: caught by the condition number
-    with np.errstate(over="ignore", invalid="ignore"):
-        scaled = inverse @ q
-        scaled += inverse @ (q - p @ scaled)
-        condition = np.where(regular, norm(p) * norm(inverse), np.inf)
-    x = np.where((condition <= LARGEST_CONDITION)[..., None, None], scaled * column.mT, np.nan)
+    inverse = np.linalg.inv(np.where(regular, p, np.eye(p.shape[-1])))
+    scaled = inverse @ q
+    scaled += inverse @ (q - p @ scaled)
+    x = np.where(regular, scaled * column.mT, np.nan)
     return np.moveaxis(x[..., 0], -1, 0), condition
 
 

@@ -67,24 +67,26 @@ def shared_samples(logs: Sequence[FloatArray]) -> FloatArray:
         steps = np.median(np.abs(np.diff(log, axis=1)), axis=1)
         error = (_ROUNDED * steps + 1e-9 * np.abs(log).max(axis=1))[:, None]
         starts = np.linspace(0, log.shape[1] - _RUN, _PROBES).astype(np.int64)
-        runs = [log[:, start : start + _RUN] for start in starts.tolist()]
-        counts = [[np.unique(row).size for row in run] for run in runs]
-        telling = [number for number, count in enumerate(counts) if max(count) >= _DIFFERENT]
-        for number in telling:
+        holders = []
+        for start in starts.tolist():
             # by as few of the rows as tell
-            run, row = runs[number], int(np.argmax(np.minimum(counts[number], _RUN // 2)))
+            run = log[:, start : start + _RUN]
+            counts = [np.unique(values).size for values in run]
+            row = int(np.argmax(np.minimum(counts, _RUN // 2)))
+            if counts[row] < _DIFFERENT:
+                continue
             if row not in sorting:
                 sorting[row] = np.argsort(every[row])
-            order = sorting[row]
             bounds = run[row, 0] + error[row] * (-1, 1)
-            first, last = np.searchsorted(every[row], bounds, sorter=order)
-            found = order[first:last]
+            first, last = np.searchsorted(every[row], bounds, sorter=sorting[row])
+            found = sorting[row][first:last]
             found = found[found <= every.shape[1] - _RUN]
             found = found[np.all(np.abs(every[:, found] - run[:, :1]) <= error, axis=0)]
             there = every[:, found[:, None] + np.arange(_RUN)]
             same = np.all(np.abs(there - run[:, None]) <= error[:, None], axis=(0, 2))
-            holders = np.unique(np.searchsorted(ends, found[same], side="right"))
-            shares[own, holders] += 1 / len(telling)
+            holders.append(np.isin(range(len(logs)), np.searchsorted(ends, found[same], "right")))
+        if holders:
+            shares[own] = np.mean(holders, axis=0)
     return shares
 
 

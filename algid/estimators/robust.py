@@ -85,7 +85,7 @@ from algid.estimators.excitation import undriven
 from algid.estimators.fit import Fit, finish, solved_anew, widened
 from algid.estimators.instruments import Explained, followed
 from algid.estimators.misfit import of_no_term
-from algid.estimators.modulating_functions import Known, Windows, row_weights
+from algid.estimators.modulating_functions import Known, Windows
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
 from algid.estimators.repeats import Groups, grouped, merged, shared_out
@@ -294,10 +294,8 @@ class RobustProblem:
             if self.shared.delay:
                 c[-1] -= base
             for normal, counts in zip(own, driven[kind], strict=True):
-                gram = normal.gram.sum(axis=0)
-                wide = np.append(c, np.zeros(gram.shape[-1] - 1 - c.size))
-                weights = row_weights(gram, np.append(-wide, 1.0), normal.rows)
-                log = weak.evidence(normal, np.where(counts, weights, 0.0), wide, kind)
+                wide = np.append(c, np.zeros(normal.gram.shape[-1] - 1 - c.size))
+                log = weak.evidence(normal.gram, normal.rows, wide, kind, used=counts)
                 logs.append(replace(_marginal(log, normal, c.size), c0=c0))
         return self._divided(logs, beta)
 

@@ -22,6 +22,7 @@ from math import ceil
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.estimators.body import with_body
@@ -360,12 +361,38 @@ def reweighted(
     return state, weighed
 
 
-def evidence(normal: Normal, weights: FloatArray, c: FloatArray, loaded: bool) -> LogInformation:
-    """A log's quadratic likelihood at `c` (q,), its joints' rows weighed by `weights` (2,)."""
+def evidence(
+    gram: FloatArray,
+    rows: int | FloatArray,
+    c: FloatArray,
+    loaded: bool,
+    *,
+    used: Sequence[bool] | NDArray[np.bool_] = (True, True),
+    every: int = 1,
+) -> LogInformation:
+    """A log's quadratic likelihood at coefficients, its rows weighed by their residual there.
+
+    Parameters
+    ----------
+    gram : (B, 2, q + 1, q + 1), of [X y], or (B, 2, 2 q + 1, 2 q + 1), of [Z X y]
+        With instruments Z the likelihood is projected on them: see `algid.estimators.instruments`.
+    rows : how many windows there are, or (2,) of each joint
+    c : (q,)
+    loaded : whether the log is
+    used : (2,), which joints' rows count
+    every : every how many windows are among the rows
+    """
+    q = c.size
+    v = np.concatenate([np.zeros(gram.shape[-1] - 1 - q), -c, [1.0]])
+    weights = np.where(used, row_weights(gram.sum(axis=0), v, rows), 0.0)
     # Overlapping rows repeat each other: a window's worth of rows counts as two.
-    gram = np.einsum("a,baxy->bxy", weights * (2.0 / OVERLAP), normal.gram)
-    S = gram[:, :-1, :-1]
-    return LogInformation(loaded, c, S, gram[:, :-1, -1] - S @ c)
+    gram = np.einsum("a,baxy->bxy", weights * (2.0 * every / OVERLAP), gram)
+    S = gram[:, :q, -1 - q : -1]
+    g = gram[:, :q, -1] - S @ c
+    if gram.shape[-1] > q + 1:
+        projection = S.sum(axis=0).T @ scaled_pinv(gram[:, :q, :q].sum(axis=0))
+        S, g = projection @ S, g @ projection.T
+    return LogInformation(loaded, c, S, g)
 
 
 def solve(normals: Sequence[Normal], loaded: bool = False) -> Solved:
@@ -387,5 +414,4 @@ def solve(normals: Sequence[Normal], loaded: bool = False) -> Solved:
 
     start: FloatArray = np.empty(0)
     c, _ = reweighted(weigh, solved, start)
-    both = zip(normals, weigh(c), strict=True)
-    return c, [evidence(normal, own, c, loaded) for normal, own in both]
+    return c, [evidence(normal.gram, normal.rows, c, loaded) for normal in normals]

@@ -48,7 +48,7 @@ def test_the_estimate_is_that_of_two_stages_of_least_squares() -> None:
     # nine stretches of ten rows
     columns = np.concatenate([Z, X, y[:, None]], axis=1).reshape(2, 7, 9, 10)
     gram = np.einsum("axbr,aybr->baxy", columns, columns)
-    found = instruments.projected(gram, 90, start, True)
+    found = weak.evidence(gram, 90, start, True, every=2)
     assert (found.loaded, found.S.shape) == (True, (9, 3, 3))
     residual = y - np.einsum("q,aqr->ar", start, X)
     level = np.sqrt(np.sum(residual**2, axis=1) / 90)

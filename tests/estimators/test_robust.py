@@ -185,8 +185,9 @@ def test_a_likelihood_beside_shapes_is_that_of_least_squares_with_their_prior() 
     rng = np.random.default_rng(4)
     X = rng.standard_normal((2, 6, 40)) * np.array([1.0, 2.0, 3.0, 20.0, 0.1, 1.0])[:, None]
     X[1, 3] = X[0, 4] = 0.0  # a shape is one joint's
+    X[:, 5] /= np.sqrt(np.mean(X[:, 5] ** 2, axis=1, keepdims=True))  # so that rows weigh one
     normal = weak.Normal(weak.grams(X, 8), 0.01, 40, np.array([40.0, 40.0]), np.ones(2))
-    found = _marginal(weak.evidence(normal, np.ones(2), np.zeros(5), False), normal, 3)
+    found = _marginal(weak.evidence(normal.gram, normal.rows, np.zeros(5), False), normal, 3)
     torque, size = (np.sqrt(np.mean(X[[0, 1], own] ** 2, axis=1)) for own in (5, [3, 4]))
     known = np.zeros((2, 5))
     known[:, 3:] = np.diag(size / (BESIDE * torque))
