@@ -89,8 +89,10 @@ def test_a_payload_that_is_given_is_as_wrong_as_told(tmp_path: Path) -> None:
     place = prior.belief.shared.names.index("m_p")
     assert prior.belief.mean[place] == 0.8
     assert prior.belief.std[place] == pytest.approx(0.1 * 0.8 / SURE)
-    usual = believed(result_of(values_of(ODD), payload=PAYLOAD), tmp_path, payload=0.8)
+    body = result_of(values_of(ODD), payload=PAYLOAD | {"J_p": 0.002})
+    usual = believed(body, tmp_path, payload=0.8)
     assert usual.belief.std[place] == pytest.approx(0.2 * 0.8 / SURE)
+    assert usual.belief.mean[-1] == pytest.approx(0.002 * 0.8 / 0.5)
 
 
 def test_terms_that_no_plan_holds_are_left_out_and_said(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -25,6 +26,7 @@ from algid.estimators.whitening import NoiseLevels
 from algid.notices import Notice
 from algid.readers import read_log
 from tests.cli.commands import app
+from tests.report.pages import Page, typed
 
 NOISE = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
 FLAGS: dict[str, str | float | None] = {
@@ -192,6 +194,62 @@ def test_the_folder_holds_the_trajectory_in_every_form(folder: Path) -> None:
     k = prior_of("case1", None, PriorKnowledge()).belief.load(True).c
     loaded = table.select("loaded_tau1", "loaded_tau2").to_numpy().T
     np.testing.assert_allclose(inverse_dynamics(k, *motion), loaded, atol=1e-9)
+
+
+def test_the_page_says_what_the_json_holds_and_draws_the_trajectory(folder: Path) -> None:
+    page = Page((folder / "report.html").read_text(encoding="utf-8"))
+    told = json.loads((folder / "design.json").read_text(encoding="utf-8"))
+    bounds, limits = page.tables["Predicted standard deviations"], page.tables["Active limits"]
+    heads = "Parameter|Believed|Predicted ±|Unit|± %|Requested|Worst arm ± %"
+    assert "|".join(bounds[0]) == heads
+    assert "|".join(limits[0]) == "Limit|Used|Allowed|%|Active|Unit|Tightest"
+    for row, (name, one) in zip(bounds[1], told["parameters"].items(), strict=True):
+        assert (row[0], row[3].replace("²", "^2"), row[5]) == (name, one["unit"], "yes")
+        worst = 100 * one["worst_std"] / one["believed"]
+        wanted = one["believed"], one["std"], 100 * one["relative"], worst
+        found = [float(row[place]) for place in (1, 2, 4, 6)]
+        np.testing.assert_allclose(found, wanted, rtol=0.05)  # two digits
+    used = dict[str, Any]()
+    for one in told["used"]:
+        sides = told["limits"][one["limit"].replace("-", "_")]
+        if one["joint"]:
+            own = np.array(sides)[..., one["joint"] - 1]
+            sides = own if own.size == 2 else [-own, own]
+        assert np.abs(np.subtract(sides, one["allowed"])).min() < 1e-9
+        load = {None: "", True: ", loaded", False: ", unloaded"}[one["loaded"]]
+        used.setdefault(one["limit"].replace("-", " ") + load, one)
+    units = {"range": "rad", "speed": "rad/s", "acceleration": "rad/s²", "tip height": "m"}
+    for row, (kind, one) in zip(limits[1], used.items(), strict=True):
+        way = "up" if one["allowed"] > 0 else "down"
+        place = f"joint {one['joint']}, {way}" if one["joint"] else "–"
+        active = "yes" if one["share"] >= 0.98 * 0.95 else ""
+        assert (row[0], row[4], row[6]) == (kind, active, place)
+        assert row[5] == units.get(kind, "N m")
+        found = [float(cell.replace("−", "-")) for cell in row[1:4]]
+        np.testing.assert_allclose(
+            found, [one["most"], one["allowed"], 100 * one["share"]], rtol=1e-3
+        )
+    least = max(told["parameters"], key=lambda name: told["parameters"][name]["relative"])
+    for words in (
+        f"{least} is the least certain", f"{limits[1][0][0]} of {limits[1][0][6]} (",
+        "1 unloaded run and 1 loaded run together", "the worst of 20 drawn", "A margin of 5.0 %",
+        "2.000 s under position control · logged at 500.0 Hz · prior case1",
+        "is the space around the arm free?", "payload of 0.35", "the red one its limit",
+        "a planned identification",
+    ):  # fmt: skip
+        assert words in page.text
+    table = pl.read_csv(folder / "trajectory.csv")
+    drawn = page.figures["motion"]
+    names = [
+        f"{name}{joint}" for name in ("theta", "omega", "tau", "loaded_tau") for joint in (1, 2)
+    ]
+    for trace, name in zip(drawn["data"], names, strict=True):
+        np.testing.assert_allclose(typed(trace["x"]), np.arange(1001) / 500, rtol=1e-5)
+        np.testing.assert_allclose(typed(trace["y"]), table[name], rtol=1e-5, atol=1e-6)
+    lines = [shape["y0"] for shape in drawn["layout"]["shapes"]]
+    sides = [*np.transpose(told["limits"]["range"]), [-3, 3], [-3, 3]]
+    sides += 2 * [[-1.9, 1.9], [-0.95, 0.95]]
+    np.testing.assert_allclose(lines, np.ravel(sides))
 
 
 def test_the_joint_trajectory_is_what_a_controller_takes(folder: Path) -> None:

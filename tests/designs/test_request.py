@@ -121,3 +121,5 @@ def test_limits_are_a_pair_of_joints_and_infinite_where_none_is_told() -> None:
     np.testing.assert_array_equal(whole.ends, [[-np.inf] * 2, [np.inf] * 2])
     np.testing.assert_array_equal(whole.middle, [-np.pi / 2, 0])
     assert whole.height == 0.1
+    with pytest.raises(SettingError, match=r"^--set tip_height: the link lengths are not known"):
+        limits_of(request(None, {**GIVEN, "tip_height": 0.1}), np.full(2, np.nan))

@@ -13,7 +13,10 @@ import sympy as sp
 from algid.arm import FloatArray
 from algid.estimators.modulating_functions import Windows
 from algid.model import EVERY_TERM, TERMS, Model, Motion, partials, regressor, torque
-from algid.physics.expressions import Expression
+from algid.physics.effort import Effort, absent, without_terms
+from algid.physics.expressions import Expression, Values
+from algid.physics.motion import Widths
+from algid.physics.signals import C12, S1, W2
 from algid.physics.terms import ALWAYS, OPTIONAL
 from algid.signals.segments import Segment
 from tests.estimators.test_model import VALUES
@@ -145,3 +148,38 @@ def test_every_parameter_says_what_it_is() -> None:
         assert one.meaning
         assert one.plausible[0] < one.plausible[1]
         assert one.sign == "±" or one.plausible[0] in (0.0, -np.inf)
+
+
+@pytest.mark.parametrize("one", [2.5, 1, -1, -0.5])
+@pytest.mark.parametrize("two", [2.5, 1, -1, -0.5])
+def test_an_expression_its_sum_and_its_source_are_one_number(one: float, two: float) -> None:
+    e, motion = one * S1 * W2 + two * C12 - two, moving(0.05)
+    (q1, q2), (_, w2) = motion.theta, motion.omega
+    expected = one * np.sin(q1) * w2 + two * np.cos(q1 + q2) - two
+    values, place = Values(motion, Widths()), np.empty(q1.size)
+    values.into(place, e)
+    known = {"s1": np.sin(q1), "w2": w2, "c12": np.cos(q1 + q2)}
+    for found in (values.sum(e), place, eval(e.source(), known)):
+        np.testing.assert_allclose(found, expected, atol=1e-14)
+
+
+RUBS = "k6 k7 f1 f2 s1 s2 a1 a2 e1 e2"
+
+
+@pytest.mark.parametrize(
+    ("effort", "gone", "terms"),
+    [
+        ("raw", "", ""),
+        ("gravity-compensated", "k2 k4 k2s k4s", "elastic"),
+        ("friction-compensated", RUBS, "coulomb stribeck asymmetry load"),
+        (
+            "external",
+            f"k1 k2 k3 k4 k5 j2 gain2 k1s k2s k4s {RUBS}",
+            "coulomb rotor stribeck asymmetry load gain elastic",
+        ),
+    ],
+)
+def test_what_a_driver_takes_off_is_none_of_the_arms(effort: Effort, gone: str, terms: str) -> None:
+    names = [name for term in (*ALWAYS, *OPTIONAL) for name in term.names]
+    assert set(absent(effort, names)) == set(gone.split())
+    assert set(TERMS) - set(without_terms(effort, TERMS)) == set(terms.split())

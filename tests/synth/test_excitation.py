@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid.arm import Arm
+from algid.arm import Arm, inverse_dynamics
 from algid.base.errors import SettingError
 from algid.synth.cases import case_names, load_case
-from algid.synth.excitation import Hold, SampledTorque
+from algid.synth.excitation import Hold, SampledTorque, wide_multi_sine
 
 
 @pytest.mark.parametrize(
@@ -130,3 +130,18 @@ def test_a_file_that_describes_no_arm_is_refused_with_its_line(
     assert str(refused.value).startswith(f"{file}: ")
     assert message in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_the_wide_torque_is_six_waves_of_what_a_joint_needs(joint: int) -> None:
+    """Stretched out, at 4 rad/s and 40 rad/s²."""
+    arm, t = load_case("case1").arm, np.linspace(0.0, 1.0, 7)
+    wave, push = wide_multi_sine(arm, 3), np.eye(2)[:, joint : joint + 1]
+    need = inverse_dynamics(arm.constants(), 0 * push, 4 * push, 40 * push)[joint, 0]
+    np.testing.assert_allclose(wave.amplitude[joint], 6 * [0.6 * need])
+    f, phase = np.array(wave.frequency[joint]), np.array(wave.phase[joint])
+    np.testing.assert_allclose(f, 0.3 * (8 / 0.3) ** (np.arange(6) / 5))
+    assert 0 < phase.min() < phase.max() < 2 * np.pi
+    expected = 0.6 * need * np.sin(2 * np.pi * np.outer(t, f) + phase).sum(axis=1)
+    np.testing.assert_allclose(wave(t)[joint], expected)
+    assert wide_multi_sine(arm, 4).phase != wave.phase == wide_multi_sine(arm, 3).phase

@@ -61,6 +61,22 @@ def test_a_schedule_that_makes_no_sense_is_refused(schedule: list[tuple[float, f
         synthesise(CASE, WAVE, SHORT, schedule=schedule)
 
 
+def test_each_log_tells_in_samples_how_far_it_is() -> None:
+    told = list[tuple[str, int, int]]()
+    synthesise(CASE, WAVE, SHORT, lambda *step: told.append(step))
+    for role in ("unloaded", "loaded"):
+        done = [count for stage, count, _ in told if stage == role]
+        assert done == sorted(set(done))
+        assert 1 < done[0] < done[-1] == 61
+    assert {(stage, total) for stage, _, total in told} == {("unloaded", 61), ("loaded", 61)}
+
+
+@pytest.mark.parametrize(("rate", "duration"), [(2.0, 0.1), (1e6, 1e6)])
+def test_a_log_of_no_step_or_of_too_many_is_refused(rate: float, duration: float) -> None:
+    with pytest.raises(SettingError, match=r"^--duration: .* Hz are .* samples; expected 2 to "):
+        Acquisition(rate=rate, duration=duration)
+
+
 def plan_of(k: FloatArray, loaded: FloatArray, amplitude: float = 0.4) -> Reference:
     t = np.arange(401) / 400
     wave = 2 * np.pi * t

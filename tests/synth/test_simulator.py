@@ -35,3 +35,6 @@ def test_angles_agree_with_another_integrator() -> None:
 def test_a_torque_that_no_arm_bears_is_refused() -> None:
     with pytest.raises(SettingError, match=r"grows without bound .* weaker torque"):
         simulate(K, lambda now: np.full((2, now.size), 1e30), np.linspace(0, 1, 11))
+    for times in (np.zeros(1), np.zeros(2)):
+        with pytest.raises(ValueError, match="at least two increasing times"):
+            simulate(K, lambda now: np.zeros((2, now.size)), times)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from algid.tracks.page import (
     POINTS,
     change_table,
     payload_figure,
+    stretch_table,
+    verdict,
 )
 from algid.tracks.result import Stretch, Track, TrackResult
 from tests.report.pages import named, typed
@@ -104,3 +107,43 @@ def test_a_long_track_keeps_its_extremes_and_breaks_at_holes() -> None:
     holey = replace(still, track=replace(still.track, t=t))
     (curve,) = [one for one in payload_figure(holey).data if one["name"].startswith("m_p(t)")]
     assert np.count_nonzero(np.isnan(typed(curve["y"]))) == 2  # in the hole, and at the end
+
+
+HALF = "the least certain to ± 0.0020 kg (95 %)"
+
+
+@pytest.mark.parametrize(
+    ("masses", "changes", "grade", "words"),
+    [
+        ([0.1], {}, "good", "the payload does not change: 0.1000 ± 0.0020 kg throughout."),
+        ([0, 0.3], {}, "good", f"changes 1 time at 1.00 s, weighing 0 and 0.3000 kg, {HALF}."),
+        ([0.1, 0.3] * 3, {}, "good", f"changes 5 times, in 6 stretches, {HALF}."),
+        ([0.1], {"explained": 0.49}, "failed", "explain only 49 % of the torque: is it this arm"),
+        ([0.1], {"explained": 0.89}, "reservations", "but arm and payload explain only 89 % of"),
+        ([0.1], {"explained": 0.91}, "good", ""),
+        ([0.1], {"colour": 4.1, "explained": 0.95}, "reservations", "has errors of 2.0 times its"),
+        ([0.1], {"colour": 3.9}, "good", ""),
+        ([0.1], {"colour": 1.1e4}, "reservations", "has errors of 105 times its"),
+        (
+            [0.1],
+            {"colour": 1.1e4, "explained": 0.98},
+            "failed",
+            "arm and payload miss the torque by 105 times its sensors' noise: is it this arm",
+        ),
+        ([-0.1, 0.3], {}, "failed", "Failed: 1 of 2 stretches with a negative mass"),
+        ([0.3, 0.3, -0.1], {}, "reservations", "but stretch 3: negative payload mass"),
+        ([0], {"tip_equivalent": 1e-4}, "failed", "the arm moves too little to weigh anything"),
+        ([1, 0], {"tip_equivalent": 1e-4}, "reservations", "stretch 2 moves too little to be"),
+    ],
+)
+def test_the_verdict_is_that_of_what_is_explained_of_errors_and_of_stretches(
+    masses: list[float], changes: dict[str, Any], grade: str, words: str
+) -> None:
+    made = track(masses)
+    found = verdict(replace(made, track=replace(made.track, **changes)))
+    assert found.grade == grade
+    assert words in found.sentence
+    known = track(masses, schedule=((0.0, masses[0]), (1.0, 9.0)))
+    number, *span, mass, half, unit, _, true, off = stretch_table(known).rows[0]
+    assert (number, *span, half, unit) == ("1", "0.000", "1.000", "0.0020", "kg")
+    assert (float(mass), float(true), float(off)) == (masses[0], masses[0], 0.0)
