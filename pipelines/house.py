@@ -40,7 +40,8 @@ IDEAS = {
     "leave-one-outs": r"(?i)^\w+\.\w*left_out$",
     "Runge-Kuttas": r"/ 6(\.0)? \* \(",
     "sandwiches": r"^combine\.sandwich$",
-    "tests of the model": r"^(log_likelihood\.refuted|innovations\.judge|misfit\.misfit)$",
+    # Whiteness (`innovations.judge`) and repeats decide what error bars rest on, and test no model.
+    "tests of the model": r"\.exceeds_noise\(|= _score\(",
     "choosers of terms": r"^terms\.run$",
 }
 """By idea, a pattern of `module.function` or of the source of each function of the core that holds

@@ -41,7 +41,7 @@ from algid.model import DELAYS
 from algid.notices import Notice, has_code
 
 if TYPE_CHECKING:
-    from algid.estimators.terms import Products
+    from algid.estimators.misfit import Products
 
 Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION", "FROM_PRIOR"]
 Intervals = Literal["likelihood", "sandwich", "jackknife"]

@@ -1,8 +1,9 @@
-"""Whether the residual of a likelihood depends on the motion: the model lacks something then.
+"""Whether the likelihood holds: the noise that it leaves, and how that depends on the motion.
 
 The likelihood takes the level of the torque's noise from the logs. A torque that the model lacks
-makes that level grow, and the error bars with it, by less than it moves the estimates. Rao's score
-test (1948) sees it: of torques G that a motion makes, beside those of the model, the residual e has
+makes that level grow, and the error bars with it, by less than it moves the estimates. Where it is
+far beyond what neighbouring samples differ by, no sensor has such noise. Of less, Rao's score test
+(1948) sees it: of torques G that a motion makes, beside those of the model, the residual e has
 
     b = GᵀV⁻¹e - XᵀS⁻¹ YᵀV⁻¹e,   W = bᵀ M⁺ b,   M = GᵀV⁻¹G - XᵀS⁻¹X,   X = YᵀV⁻¹G
 
@@ -25,19 +26,208 @@ G       torques beside them                                (2 n, m)          N m
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.arm import FloatArray
+from algid.arm import FloatArray, keep_arrays
 from algid.base.compiled import chi2_tail
-from algid.base.names import places_outside
-from algid.estimators.combine import Prior, scaled_pinv
-from algid.estimators.fit import Fit
-from algid.estimators.terms import TERM_OF, WIDTHS, Products, widened
-from algid.model import Model, Motion, regressor, smooth_sign
+from algid.base.names import places_outside, vector
+from algid.estimators.combine import scaled_pinv
+from algid.estimators.hold import Lateness
+from algid.estimators.log_likelihood import Beside, LogEvidence
+from algid.estimators.parametrisation import Shared
+from algid.model import (
+    DELAYS,
+    EVERY_TERM,
+    TERMS,
+    Model,
+    Motion,
+    attributes,
+    loads_of,
+    names_of,
+    regressor,
+    smooth_sign,
+    terms_named,
+    torque,
+    without_delay,
+)
+from algid.physics.motion import Widths
+from algid.physics.terms import ALWAYS
+
+if TYPE_CHECKING:
+    from algid.estimators.fit import Fit
+
+WIDTHS = tuple(one.name for one in fields(Widths))
+"""Widths of friction, whose logarithms have a column where a term has that width."""
+TERM_OF = {name: term for term, entry in EVERY_TERM.items() for name in entry.names}
+_STAMPS = 0.01
+"""Of a period: what stamps leave open at least, also in the log of a simulator."""
+_STEP = 1e-3
+"""Relative change of a width of friction by which its effect is differentiated."""
+
+
+def widened(model: Model, c: FloatArray, motion: Motion, _dt: float) -> FloatArray:
+    """Derivatives (widths, 2, n) of the torque by the logarithms of friction's widths, in N m."""
+    rows = []
+    for width in WIDTHS:
+        sides = []
+        for step in (_STEP, -_STEP):
+            other = replace(model, **{width: getattr(model, width) * (1 + step)})
+            sides.append(torque(other, c, motion))
+        rows.append((sides[0] - sides[1]) / (2 * _STEP))
+    return np.stack(rows)
+
+
+class Products:
+    """Normal equations of one pass of the likelihood, with the columns of every term.
+
+    Parameters
+    ----------
+    logs : Sequence of LogEvidence
+    shared : Shared
+        Whose coefficients `at` are.
+    at : coefficients (q,) of unloaded and of loaded logs
+        Where it is linearised; those of other terms are zero.
+    base : float, s
+        The delay from which the column of the delay counts.
+    beside : Beside
+        `widened`, and what other torques are to be in `each`.
+
+    `names` are those of the coefficients, of every term and widths; `each` has for a log whether it
+    is loaded, and the products of its columns, the torques beside them and the residual.
+    """
+
+    def __init__(
+        self,
+        logs: Sequence[LogEvidence],
+        shared: Shared,
+        at: Mapping[bool, FloatArray],
+        base: float,
+        beside: Beside = widened,
+    ) -> None:
+        own = shared.model.terms
+        every = tuple(name for name, term in TERMS.items() if not term.lags or name in own)
+        self.shared = Shared(replace(shared.model, terms=every), delay=True)
+        self.names = self.shared.log_names + WIDTHS
+        loads = loads_of(self.shared.model)
+        self._rigid = np.flatnonzero([name in loads for name in self.names])
+        self._both = len({log.loaded for log in logs}) == 2
+        self.size = len(self.names) + self._both * len(self._rigid)
+        self._base = base
+        self.determinant = 0.0
+        self.each: list[tuple[bool, FloatArray]] = []
+        grams, q = [], len(self.shared.log_names)
+        driven = [
+            any(np.any(piece.tau[joint]) for log in logs for piece in log.kept) for joint in (0, 1)
+        ]
+        for log in logs:
+            known = dict(zip(shared.log_names, at[log.loaded].tolist(), strict=True))
+            c = vector(self.names, {DELAYS[0]: base, **known}, otherwise=0.0)
+            gram, determinant = log.products(self.shared, c[:q], beside)
+            if not all(driven):
+                # where a joint has no motor, its gain is nothing and makes its equation vanish
+                for name, _ in attributes(self.shared.model, "gains"):
+                    gram[:, self.names.index(name)] = gram[:, :, self.names.index(name)] = 0
+            self.determinant += determinant
+            self.each.append((log.loaded, gram.sum(axis=0)))
+            # the torque itself in the place of what the point of linearisation leaves of it
+            c[q - 1] -= base
+            to_p = np.zeros((gram.shape[-1], self.size + 1))
+            to_p[np.arange(c.size), self._places(log.loaded)] = 1
+            to_p[: c.size, -1] = c
+            to_p[-1, -1] = 1
+            grams.append(to_p.T @ gram @ to_p)
+        self._grams = np.array(grams)
+        self.total = self._grams.sum(axis=(0, 1))
+        self.samples = sum(log.trained for log in logs)
+        self.dt = max(log.kept[0].dt for log in logs)
+        of_delay = self.names.index(DELAYS[0])
+        self.open_squares = (_STAMPS * self.dt) ** 2 * float(self.total[of_delay, of_delay])
+        self.noisy = self.open_squares < self.samples
+        keep_arrays(self)  # a fit hands it on
+
+    def _places(self, loaded: bool) -> NDArray[np.int64]:
+        """Where a log's coefficients and widths stand in p."""
+        places = np.arange(len(self.names))
+        if loaded and self._both:
+            places[self._rigid] = len(self.names) + np.arange(len(self._rigid))
+        return places
+
+    def columns(self, terms: Iterable[str]) -> NDArray[np.int64]:
+        """Places in p of eq. (1), of `terms` and of their widths."""
+        present = tuple(terms_named(terms))
+        shapes = [width for term in present for width in term.shapes]
+        return self._named([*names_of(ALWAYS), *names_of(present), *shapes])
+
+    def own(self, term: str) -> NDArray[np.int64]:
+        """Places in p of the coefficients of one term."""
+        return self._named(EVERY_TERM[term].names)
+
+    def _named(self, names: Collection[str]) -> NDArray[np.int64]:
+        """Places in p of coefficients by name, the loaded arm's with them."""
+        wanted = np.array([name in names for name in self.names])
+        if self._both:
+            wanted = np.append(wanted, wanted[self._rigid])
+        return np.flatnonzero(wanted)
+
+    def solve(self, columns: NDArray[np.int64]) -> tuple[FloatArray, float, FloatArray]:
+        """Least squares on `columns`: p (P,), the squares left, and the inverse of its matrix."""
+        inverse = scaled_pinv(self.total[np.ix_(columns, columns)])
+        p = np.zeros(self.size)
+        p[columns] = inverse @ self.total[columns, -1]
+        left = float(self.total[-1, -1] - p[columns] @ self.total[columns, -1])
+        return p, max(left, 0.0), inverse
+
+    def coefficients(self, p: FloatArray) -> dict[bool, FloatArray]:
+        """Coefficients (q,) of unloaded and of loaded logs, the delay whole."""
+        at = {}
+        for loaded in (False, True):
+            c = p[self._places(loaded)][: len(self.shared.log_names)]
+            c[-1] += self._base
+            at[loaded] = c
+        return at
+
+    def mean_square(self, columns: NDArray[np.int64]) -> float:
+        """Mean square of what `columns` leave, 1 where the model holds; no less."""
+        _, left, _ = self.solve(columns)
+        return max(1.0, left / max(2 * self.samples - len(columns), 1))
+
+    def levels(
+        self, logs: Sequence[LogEvidence], columns: NDArray[np.int64]
+    ) -> Iterator[FloatArray]:
+        """What `columns` leave of each log's torques, RMS (2,) in N m."""
+        p, _, _ = self.solve(columns)
+        v = np.append(-p, 1.0)
+        for log, gram in zip(logs, self._grams, strict=True):
+            left = np.maximum(np.einsum("i,aij,j->a", v, gram, v), 0.0)
+            yield log.noise.tau * np.sqrt(left / log.trained)
+
+    def lateness(self, terms: Sequence[str]) -> Lateness:
+        """How late the torque acts in the model with `terms`."""
+        rest = self.columns(without_delay(terms))
+        delay = self.names.index(DELAYS[0])
+        columns = np.append(rest, delay)
+        scale = self.mean_square(columns)
+        p, _, inverse = self.solve(columns)
+        return Lateness(
+            self._base + float(p[delay]),
+            float(np.sqrt(scale * max(inverse[-1, -1], 0.0))),
+            0.5 * self.dt,
+            float(np.max(self.effect(delay, rest, scale))),
+        )
+
+    def effect(self, place: int, rest: NDArray[np.int64], scale: float) -> FloatArray:
+        """By how many of its deviations each coefficient of `rest` (R,) moves without another one.
+
+        For a unit of that at `place`; `scale` is the mean square of what is left.
+        """
+        _, _, inverse = self.solve(rest)
+        size = np.sqrt(scale * np.maximum(np.diag(inverse), 0.0))
+        return np.abs(inverse @ self.total[rest, place]) / np.maximum(size, 1e-300)
 
 
 class _Joint(NamedTuple):
@@ -108,19 +298,31 @@ def _acting(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     return np.where(np.sqrt(np.mean(T**2, axis=1)) > _CANCELS * size, T.T, 0.0).T
 
 
-def misfit(fit: Fit, products: Products, prior: Prior | None) -> float:
-    """The p value of the score test of a fit by the likelihood.
+def misfit(
+    logs: Sequence[LogEvidence],
+    levels: Iterable[FloatArray],
+    fit: Fit | None = None,
+    products: Products | None = None,
+) -> float:
+    """The p value of the test of the model.
 
-    Of all torques beside the model's together, and of the most evident kind (Bonferroni).
+    0, its extreme, where the torques' errors are no sensor's noise. Else that of the score test of
+    a fit: of all torques beside the model's together, and of the most evident kind (Bonferroni).
 
     Parameters
     ----------
-    fit : Fit
-    products : Products
+    logs : Sequence of LogEvidence
+    levels : (2,) in N m
+        Errors of each log's torques.
+    fit : Fit, optional
+        By the likelihood.
+    products : Products, optional
         Of some of its logs, at its estimates, with the torques `shapes`.
-    prior : Prior, optional
-        What held the fit beside its logs.
     """
+    if any(log.exceeds_noise(level) for log, level in zip(logs, levels, strict=True)):
+        return 0.0
+    if fit is None or products is None:
+        return 1.0
     shared, names, kinds = fit.shared, products.names, 2 * [kind for kind, _ in _SHAPES]
     present = [names.index(name) for name in shared.log_names]
     absent = places_outside(names, [*shared.log_names, *WIDTHS])
@@ -135,9 +337,9 @@ def misfit(fit: Fit, products: Products, prior: Prior | None) -> float:
         whole = whole + by_shared.T @ gram @ by_shared
     P = Q + len(free)
     S, X, G = whole[:P, :P], whole[:P, P + 1 :], whole[P + 1 :, P + 1 :]
-    if prior is not None:
-        known = prior.places(fit.names)
-        S[np.ix_(known, known)] += prior.precision
+    if fit.prior is not None:
+        known = fit.prior.places(fit.names)
+        S[np.ix_(known, known)] += fit.prior.precision
     D = scaled_pinv(S) @ X  # what the parameters take up
     M, b = G - X.T @ D, whole[P + 1 :, P] - D.T @ whole[:P, P]
     kinds = [TERM_OF[names[place]] for place in absent] + kinds

@@ -38,11 +38,10 @@ from algid.estimators.fit import Fit, finish
 from algid.estimators.identifiability import open_directions
 from algid.estimators.innovations import judge
 from algid.estimators.log_likelihood import LogEvidence, Outcome, opened
-from algid.estimators.misfit import misfit, shapes
+from algid.estimators.misfit import Products, misfit, shapes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem
 from algid.estimators.repeats import Groups, grouped
-from algid.estimators.terms import Products
 from algid.estimators.weak import fit as weak_fit
 from algid.estimators.whitening import NoiseLevels
 from algid.model import TERMS, Model, attributes
@@ -149,7 +148,7 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
         at = {log.loaded: shared.coefficients(fitted.values, log.loaded) for log in tested}
         try:
             products = Products(tested, shared, at, problem.settings.shift.delay, shapes)
-            p_value = misfit(fitted, products, prior)
+            p_value = misfit(tested, (log.noise.tau for log in tested), fitted, products)
         except np.linalg.LinAlgError:  # of joints that never move
             return given_up("not converged")
         if p_value < level("REFUTED"):
@@ -248,12 +247,14 @@ def _train(
         beta = beta + share * step
         if not np.all(np.isfinite(beta)):
             raise np.linalg.LinAlgError("the estimates run away")
-        if not known and any(log.refuted for log in logs):
-            return beta, outcomes, iteration, "refuted"
         if many and free and iteration > 1:
             for log, outcome in zip(logs, outcomes, strict=True):
                 log.sure = outcome.noise_change < _NOISE_SETTLED
         improved = max(outcome.noise_change for outcome in outcomes)
+        levels = (log.noise.tau for log in logs)
+        # on the way to its level noise may be larger
+        if not known and improved < _NOISE_SETTLED and misfit(logs, levels) < level("REFUTED"):
+            return beta, outcomes, iteration, "refuted"
         settled = moved < SETTLED
         if moved < earlier:
             # Steps that shrink do so in the same ratio: what is left of the geometric series.

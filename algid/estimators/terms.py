@@ -27,22 +27,21 @@ both kinds determine it and no payload need be guessed.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from algid.arm import FloatArray, keep_arrays
+from algid.arm import FloatArray
 from algid.base.compiled import chi2_exceeded
 from algid.base.names import evenly_spread, outside, vector, within
 from algid.base.significance import level
 from algid.estimators import weak
-from algid.estimators.combine import scaled_pinv
 from algid.estimators.hold import SURE, Hold, Lateness
-from algid.estimators.log_likelihood import Beside, LogEvidence, opened
+from algid.estimators.log_likelihood import LogEvidence, opened
+from algid.estimators.misfit import Products, misfit
 from algid.estimators.modulating_functions import Known, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
@@ -57,17 +56,10 @@ from algid.model import (
     SINES,
     TERMS,
     Model,
-    Motion,
-    attributes,
-    loads_of,
-    names_of,
-    terms_named,
-    torque,
     without_delay,
 )
 from algid.physics.effort import ELASTIC
 from algid.physics.motion import Widths
-from algid.physics.terms import ALWAYS
 from algid.signals.segments import pieces, spread_pieces
 
 CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and not term.lags)
@@ -82,16 +74,10 @@ _MOST_LOGS = 8
 """Logs of a kind, evenly spread, that are looked at: terms are those of the arm, not of a log."""
 _PIECES, _PIECE_SAMPLES = 4, 16384
 _ROUNDS = 3
-_EXCESS = 4.0
-"""Times what neighbouring samples differ by: what every term leaves of a torque is no more where
-the likelihood stands. Of 60 simulated logs with sound models none leaves 1.2 times, of real arms
-each leaves 4.8 times or more, which the likelihood's own noise level then takes beyond ten."""
 _SUSPECTED = 3.84
 """W of a rotor, 5 %, from which it is not left out where that would move the arm's constants."""
 _MOVES = 2.0
 """Standard deviations that k1 … k5 have without it: the least of such moves."""
-_STAMPS = 0.01
-"""Of a period: what stamps leave open at least, also in the log of a simulator."""
 
 
 @dataclass(frozen=True)
@@ -254,173 +240,6 @@ def _lowest(x: FloatArray, y: Sequence[float]) -> float:
         return float(x[least])
     a, b, _ = np.polyfit(x[least - 1 : least + 2] - x[least], y[least - 1 : least + 2], 2)
     return float(x[least] - b / (2 * a))
-
-
-WIDTHS = tuple(one.name for one in fields(Widths))
-"""Widths of friction, whose logarithms have a column where a term has that width."""
-TERM_OF = {name: term for term, entry in EVERY_TERM.items() for name in entry.names}
-_STEP = 1e-3
-"""Relative change of a width of friction by which its effect is differentiated."""
-
-
-def widened(model: Model, c: FloatArray, motion: Motion, _dt: float) -> FloatArray:
-    """Derivatives (widths, 2, n) of the torque by the logarithms of friction's widths, in N m."""
-    rows = []
-    for width in WIDTHS:
-        sides = []
-        for step in (_STEP, -_STEP):
-            other = replace(model, **{width: getattr(model, width) * (1 + step)})
-            sides.append(torque(other, c, motion))
-        rows.append((sides[0] - sides[1]) / (2 * _STEP))
-    return np.stack(rows)
-
-
-class Products:
-    """Normal equations of one pass of the likelihood, with the columns of every term.
-
-    Parameters
-    ----------
-    logs : Sequence of LogEvidence
-    shared : Shared
-        Whose coefficients `at` are.
-    at : coefficients (q,) of unloaded and of loaded logs
-        Where it is linearised; those of other terms are zero.
-    base : float, s
-        The delay from which the column of the delay counts.
-    beside : Beside
-        `widened`, and what other torques are to be in `each`.
-
-    `names` are those of the coefficients, of every term and widths; `each` has for a log whether it
-    is loaded, and the products of its columns, the torques beside them and the residual.
-    """
-
-    def __init__(
-        self,
-        logs: Sequence[LogEvidence],
-        shared: Shared,
-        at: Mapping[bool, FloatArray],
-        base: float,
-        beside: Beside = widened,
-    ) -> None:
-        own = shared.model.terms
-        every = tuple(name for name, term in TERMS.items() if not term.lags or name in own)
-        self.shared = Shared(replace(shared.model, terms=every), delay=True)
-        self.names = self.shared.log_names + WIDTHS
-        loads = loads_of(self.shared.model)
-        self._rigid = np.flatnonzero([name in loads for name in self.names])
-        self._both = len({log.loaded for log in logs}) == 2
-        self.size = len(self.names) + self._both * len(self._rigid)
-        self._base = base
-        self.determinant = 0.0
-        self.each: list[tuple[bool, FloatArray]] = []
-        grams, q = [], len(self.shared.log_names)
-        driven = [
-            any(np.any(piece.tau[joint]) for log in logs for piece in log.kept) for joint in (0, 1)
-        ]
-        for log in logs:
-            known = dict(zip(shared.log_names, at[log.loaded].tolist(), strict=True))
-            c = vector(self.names, {DELAYS[0]: base, **known}, otherwise=0.0)
-            gram, determinant = log.products(self.shared, c[:q], beside)
-            if not all(driven):
-                # where a joint has no motor, its gain is nothing and makes its equation vanish
-                for name, _ in attributes(self.shared.model, "gains"):
-                    gram[:, self.names.index(name)] = gram[:, :, self.names.index(name)] = 0
-            self.determinant += determinant
-            self.each.append((log.loaded, gram.sum(axis=0)))
-            # the torque itself in the place of what the point of linearisation leaves of it
-            c[q - 1] -= base
-            to_p = np.zeros((gram.shape[-1], self.size + 1))
-            to_p[np.arange(c.size), self._places(log.loaded)] = 1
-            to_p[: c.size, -1] = c
-            to_p[-1, -1] = 1
-            grams.append(to_p.T @ gram @ to_p)
-        self._grams = np.array(grams)
-        self.total = self._grams.sum(axis=(0, 1))
-        self.samples = sum(log.trained for log in logs)
-        self.dt = max(log.kept[0].dt for log in logs)
-        of_delay = self.names.index(DELAYS[0])
-        self.open_squares = (_STAMPS * self.dt) ** 2 * float(self.total[of_delay, of_delay])
-        self.noisy = self.open_squares < self.samples
-        keep_arrays(self)  # a fit hands it on
-
-    def _places(self, loaded: bool) -> NDArray[np.int64]:
-        """Where a log's coefficients and widths stand in p."""
-        places = np.arange(len(self.names))
-        if loaded and self._both:
-            places[self._rigid] = len(self.names) + np.arange(len(self._rigid))
-        return places
-
-    def columns(self, terms: Iterable[str]) -> NDArray[np.int64]:
-        """Places in p of eq. (1), of `terms` and of their widths."""
-        present = tuple(terms_named(terms))
-        shapes = [width for term in present for width in term.shapes]
-        return self._named([*names_of(ALWAYS), *names_of(present), *shapes])
-
-    def own(self, term: str) -> NDArray[np.int64]:
-        """Places in p of the coefficients of one term."""
-        return self._named(EVERY_TERM[term].names)
-
-    def _named(self, names: Collection[str]) -> NDArray[np.int64]:
-        """Places in p of coefficients by name, the loaded arm's with them."""
-        wanted = np.array([name in names for name in self.names])
-        if self._both:
-            wanted = np.append(wanted, wanted[self._rigid])
-        return np.flatnonzero(wanted)
-
-    def solve(self, columns: NDArray[np.int64]) -> tuple[FloatArray, float, FloatArray]:
-        """Least squares on `columns`: p (P,), the squares left, and the inverse of its matrix."""
-        inverse = scaled_pinv(self.total[np.ix_(columns, columns)])
-        p = np.zeros(self.size)
-        p[columns] = inverse @ self.total[columns, -1]
-        left = float(self.total[-1, -1] - p[columns] @ self.total[columns, -1])
-        return p, max(left, 0.0), inverse
-
-    def coefficients(self, p: FloatArray) -> dict[bool, FloatArray]:
-        """Coefficients (q,) of unloaded and of loaded logs, the delay whole."""
-        at = {}
-        for loaded in (False, True):
-            c = p[self._places(loaded)][: len(self.shared.log_names)]
-            c[-1] += self._base
-            at[loaded] = c
-        return at
-
-    def mean_square(self, columns: NDArray[np.int64]) -> float:
-        """Mean square of what `columns` leave, 1 where the model holds; no less."""
-        _, left, _ = self.solve(columns)
-        return max(1.0, left / max(2 * self.samples - len(columns), 1))
-
-    def refuted(self, logs: Sequence[LogEvidence], columns: NDArray[np.int64]) -> bool:
-        """Whether `columns` leave more than a sensor's noise in a joint's torque of some log."""
-        p, _, _ = self.solve(columns)
-        v = np.append(-p, 1.0)
-        for log, gram in zip(logs, self._grams, strict=True):
-            left = np.maximum(np.einsum("i,aij,j->a", v, gram, v), 0.0)
-            if log.exceeds_noise(log.noise.tau * np.sqrt(left / log.trained), _EXCESS):
-                return True
-        return False
-
-    def lateness(self, terms: Sequence[str]) -> Lateness:
-        """How late the torque acts in the model with `terms`."""
-        rest = self.columns(without_delay(terms))
-        delay = self.names.index(DELAYS[0])
-        columns = np.append(rest, delay)
-        scale = self.mean_square(columns)
-        p, _, inverse = self.solve(columns)
-        return Lateness(
-            self._base + float(p[delay]),
-            float(np.sqrt(scale * max(inverse[-1, -1], 0.0))),
-            0.5 * self.dt,
-            float(np.max(self.effect(delay, rest, scale))),
-        )
-
-    def effect(self, place: int, rest: NDArray[np.int64], scale: float) -> FloatArray:
-        """By how many of its deviations each coefficient of `rest` (R,) moves without another one.
-
-        For a unit of that at `place`; `scale` is the mean square of what is left.
-        """
-        _, _, inverse = self.solve(rest)
-        size = np.sqrt(scale * np.maximum(np.diag(inverse), 0.0))
-        return np.abs(inverse @ self.total[rest, place]) / np.maximum(size, 1e-300)
 
 
 @dataclass(frozen=True, eq=False)
@@ -631,7 +450,7 @@ def _selected(
     before: list[str] | None = None
     for left in reversed(range(_ROUNDS)):
         offered = first.columns(everything)
-        refuted = first.refuted(logs, offered)
+        refuted = misfit(logs, first.levels(logs, offered)) < level("REFUTED")
         scale = first.mean_square(offered)
         search = _Search(first, outside(candidates, fixed), fixed, absent, scale, candidates)
         terms = search.run()

@@ -17,9 +17,9 @@ from algid.estimators.diagnostics import constrained
 from algid.estimators.excitation import undriven
 from algid.estimators.fit import Fit, solved_anew
 from algid.estimators.hold import Hold
+from algid.estimators.misfit import TERM_OF
 from algid.estimators.terms import (
     CHOICE,
-    TERM_OF,
     Selection,
     TermTrial,
     needs_shape,
