@@ -74,12 +74,7 @@ def _logs(source: str, out: str, links: list[str]) -> list[Found]:
     """The logs of a source."""
     path = Path(source)
     if is_url(source) or (path.is_dir() and not _is_bag(source)):
-        below = _below(source, out, links)
-        return [
-            (one, name, trouble)
-            for one, name, trouble in below
-            if trouble or name.lower().endswith(SUFFIXES) or _is_bag(one)
-        ]
+        return list(_below(source, out, links))
     if path.exists():
         return [(source, path.name, None)]
     if "**" in path.parts:
@@ -94,7 +89,7 @@ def _logs(source: str, out: str, links: list[str]) -> list[Found]:
 
 
 def _below(source: str, out: str, links: list[str]) -> Iterator[Found]:
-    """Objects below a URL, or files and bags below a folder; and folders where nobody may look.
+    """Logs below a URL, or logs and bags below a folder; and folders where nobody may look.
 
     Hidden ones, results and what lies in `out` are passed over. Links to folders are not entered,
     but added to `links`.
@@ -113,10 +108,11 @@ def _below(source: str, out: str, links: list[str]) -> Iterator[Found]:
             part.startswith(".") or part.endswith(".algid") for part in name.split("/")
         )
 
+    def is_log(name: str) -> bool:
+        return name.lower().endswith(SUFFIXES) and not is_passed_over(name)
+
     if is_url(source):
-        yield from (
-            (url, name, None) for url, name in list_urls(source) if not is_passed_over(name)
-        )
+        yield from ((url, name, None) for url, name in list_urls(source) if is_log(name))
         return
     folder, unreadable = str(Path(source)), list[OSError]()
     for place, folders, names in os.walk(folder, onerror=unreadable.append):
@@ -129,7 +125,7 @@ def _below(source: str, out: str, links: list[str]) -> Iterator[Found]:
         folders[:] = [name for name in folders if not is_passed_over(below + name)]
         links += [f"{place}/{name}" for name in folders if Path(place, name).is_symlink()]
         for name in sorted(names):
-            if not is_passed_over(below + name):
+            if is_log(below + name):
                 yield f"{place}/{name}", below + name, None
     for error in unreadable:
         place = str(error.filename)
@@ -158,10 +154,10 @@ def _job_of(path: str, name: str, trouble: str | None, alone: str) -> Job:
 
 def _together(first: Job, second: Job) -> Job:
     """One job of two of one name: logs of both roles, or one that cannot be run."""
-    pairs = ((first.logs, second.logs), (first.loaded, second.loaded))
-    logs, loaded = (tuple(dict.fromkeys(one + other)) for one, other in pairs)
+    logs = tuple(dict.fromkeys(first.logs + second.logs))
+    loaded = tuple(dict.fromkeys(first.loaded + second.loaded))
     both = replace(first, logs=logs, loaded=loaded)
-    fits = all(one == other or not (one and other) for one, other in pairs)
+    fits = logs in (first.logs, second.logs) and loaded in (first.loaded, second.loaded)
     if fits and replace(second, logs=logs, loaded=loaded) == both:
         return both
     paths = ", ".join(map(redacted_path, (logs + loaded)[:MOST_NAMED]))

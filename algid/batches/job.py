@@ -5,10 +5,8 @@ No exception leaves this file.
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
-import os
 import shutil
 import time
 from collections.abc import Iterable
@@ -55,18 +53,15 @@ class Task:
     @cached_property
     def basis(self) -> str:
         """A hash of everything but the logs that decides the job's outcome."""
-        content: dict[str, Any] = {
-            name: one and one.model_dump(mode="json")
-            for name, one in (("profile", self.profile), ("parameters", self.parameters))
-        }
-        content |= {
+        prior = self.settings.prior or (self.profile and self.profile.prior)
+        content = {
+            "profile": self.profile and self.profile.model_dump(mode="json"),
+            "parameters": self.parameters and self.parameters.model_dump(mode="json"),
             "settings": self.settings.as_json(),
             "report": self.report,
             "version": __version__,
+            "prior": prior and sha256_of(Path(prior)),
         }
-        prior = self.settings.prior or (self.profile and self.profile.prior)
-        if prior:
-            content["prior"] = sha256_of(Path(prior))
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     @property
@@ -81,17 +76,15 @@ class Task:
         self, status: JobStatus, reason: str, inputs: tuple[Input, ...] | None = None, **known: Any
     ) -> JobRecord:
         """The job's record; `inputs` are its files as they are now by default."""
-        if inputs is None:
-            inputs = inputs_of(self.files)
+        inputs = inputs or inputs_of(self.files)
         job, settings = redacted(self.job), self.settings.as_json()
         return JobRecord(job, status, reason, self.basis, inputs, settings, __version__, **known)
 
 
-def run_task(task: Task) -> JobRecord | str:
+def run_task(task: Task) -> JobRecord:
     """Identify one job and write its result folder.
 
-    Whatever is raised on the way is the job's end: libraries panic by exceptions of any base. A
-    full disk where results go is no job's fault: what is said of it is given then.
+    Whatever is raised on the way is the job's end: libraries panic by exceptions of any base.
     """
     keep_freed()
     keep_to_one_core()
@@ -101,10 +94,8 @@ def run_task(task: Task) -> JobRecord | str:
         result = _identified(task)
     except BaseException as error:
         reason = TOO_LARGE if isinstance(error, MemoryError) else text_of(error)
-        if is_full(reason):
-            return reason
         seconds = time.perf_counter() - start
-        return task.record(JobStatus.FAILED, reason, inputs=inputs, seconds=seconds)
+        return task.record(JobStatus.FAILED, reason, inputs, seconds=seconds)
     judged, hashes = result.verdict, {log.path: log.sha256 for log in result.logs}
     status, reason = JobStatus.OK, ""
     lacking = ["samples were lost"] if result.data_lost else []
@@ -112,15 +103,14 @@ def run_task(task: Task) -> JobRecord | str:
         if not one.measured:
             lacking.append(f"{name} {one.status.value}")
     if judged.failed:
-        status, reason = JobStatus.FAILED, judged.sentence
-        if judged.reasons and judged.reasons[0].text not in reason:
-            reason += f" {judged.reasons[0].text}"
+        first = [one.text for one in judged.reasons[:1]]
+        status, reason = JobStatus.FAILED, " ".join([judged.sentence, *first])
     elif lacking:
         status, reason = JobStatus.INCOMPLETE, "; ".join(lacking)
     return task.record(
         status,
         reason,
-        inputs=tuple(replace(one, sha256=hashes.get(one.path)) for one in inputs),
+        tuple(replace(one, sha256=hashes.get(one.path)) for one in inputs),
         seconds=time.perf_counter() - start,
         start_ns=result.log.start_ns,
         log_seconds=sum(log.duration for log in result.logs),
@@ -134,11 +124,6 @@ def run_task(task: Task) -> JobRecord | str:
             for name, one in result.estimates.items()
         },
     )
-
-
-def is_full(text: str) -> bool:
-    """Whether a text says that there was no space left: libraries have exceptions of their own."""
-    return any(os.strerror(number) in text for number in (errno.ENOSPC, errno.EDQUOT))
 
 
 def redacted(job: Job) -> Job:

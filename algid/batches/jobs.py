@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
@@ -43,8 +44,8 @@ Label = str | Finite | Int64 | bool
 Time = Annotated[str, BeforeValidator(lambda cell: utc_of(str(cell)).isoformat())]
 TABLE = "jobs.parquet"
 """The table of all jobs, in OUT."""
-_TAKEN = (".algid", ".json")
-"""Of results and records: as folders they would lie in one another."""
+_TAKEN = (".algid", ".json", TABLE)
+"""Ends of results and records: as folders they would lie in one another."""
 
 
 @dataclass(frozen=True)
@@ -78,25 +79,21 @@ def name_fault(name: str) -> str | None:
 
     None where they can.
     """
-    parts = name.split("/")
-    for part in parts:
-        odd = not part.isprintable() or part.startswith(".") or "\\" in part
-        if odd or not 0 < len(part.encode(errors="surrogatepass")) <= 200:
-            return "expected parts of 1 to 200 printable characters, none starting with a dot"
-    if len(name.encode()) > LIMITS.name_bytes:
-        return f"expected at most {LIMITS.name_bytes} bytes"
-    if parts[0] == TABLE or any(part.lower().endswith(_TAKEN) for part in parts[:-1]):
-        return f"expected no folder that is {TABLE} or ends in {' or '.join(_TAKEN)}: algid's own"
+    *folders, _ = parts = name.split("/")
+    sizes = [len(part.encode(errors="surrogatepass")) for part in parts]
+    odd = not name.isprintable() or "\\" in name or "/." in f"/{name}"
+    if odd or min(sizes) == 0 or max(sizes) > 200:
+        return "expected parts of 1 to 200 printable characters, none starting with a dot"
+    if sum(sizes) > LIMITS.name_bytes or any(one.lower().endswith(_TAKEN) for one in folders):
+        own = " or ".join(_TAKEN)
+        return f"expected at most {LIMITS.name_bytes} bytes, and no folder that ends in {own}"
     return None
 
 
 def safe_name(name: str) -> str:
     """A name that can stand for one that cannot: what is readable of it, and a hash."""
-    content = name.encode(errors="surrogatepass")
-    readable = "".join(
-        letter if letter.isalnum() or letter in "-_. " else "%" for letter in name[:40]
-    )
-    return f"%{readable}~{hashlib.sha256(content).hexdigest()[:8]}"
+    digest = hashlib.sha256(name.encode(errors="surrogatepass")).hexdigest()
+    return "%" + re.sub(r"[^-. \w]", "%", name[:40]) + f"~{digest[:8]}"
 
 
 def redacted_path(path: str) -> str:
@@ -267,25 +264,22 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
     kinds: dict[str, Any] = dict.fromkeys(COLUMNS, pl.String)
     kinds |= {"time": pl.Datetime("us", "UTC"), "seconds": pl.Float64, "log_seconds": pl.Float64}
     kinds |= {"reasons": texts, "logs": texts, "sha256": texts, "size": sizes, "changed": times}
-    rows, texts_of = list[dict[str, Any]](), dict[str, bool]()
-    for one in records:
-        for name, label in one.job.labels.items():
-            texts_of[name] = texts_of.get(name, False) or type(label) in (str, bool)
-    for name, is_text in sorted(texts_of.items()):
-        kinds[f"label_{name}"] = pl.String if is_text else pl.Float64
-    for name in sorted({name for one in records for name in one.estimates}):
-        kinds |= {name: pl.Float64, f"{name}_std": pl.Float64, f"{name}_status": pl.String}
+    rows, labels, estimates = list[dict[str, Any]](), dict[str, Any](), dict[str, Any]()
     for one in records:
         row: dict[str, Any] = {**vars(one), "job": one.job.name, "robot": one.job.robot}
         row["settings"] = json.dumps(one.settings, sort_keys=True)
+        start = one.start_ns or 0
         if one.job.time is not None:  # as its manifest says, or as its first stamp does
             row["time"] = utc_of(one.job.time)
-        elif one.start_ns is not None and one.start_ns >= FIRST_EPOCH_NS:
-            row["time"] = datetime.fromtimestamp(one.start_ns * 1e-9, UTC)
+        elif start >= FIRST_EPOCH_NS:
+            row["time"] = datetime.fromtimestamp(start * 1e-9, UTC)
         row |= {column: [getattr(log, name) for log in one.inputs] for column, name in _OF_LOGS}
         for name, label in one.job.labels.items():
-            row[f"label_{name}"] = str(label) if texts_of[name] else label
+            is_text, column = isinstance(label, str | bool), f"label_{name}"
+            row[column] = str(label) if is_text else label
+            labels[column] = pl.String if is_text else labels.get(column, pl.Float64)
         for name, numbers in one.estimates.items():
             row |= zip((name, f"{name}_std", f"{name}_status"), numbers, strict=True)
+            estimates |= {name: pl.Float64, f"{name}_std": pl.Float64, f"{name}_status": pl.String}
         rows.append(row)
-    return pl.DataFrame(rows, kinds, strict=False)
+    return pl.DataFrame(rows, kinds | labels | estimates, strict=False)

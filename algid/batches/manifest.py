@@ -23,6 +23,7 @@ from pydantic import (
     Field,
     TypeAdapter,
     ValidationError,
+    ValidationInfo,
     model_validator,
 )
 
@@ -65,11 +66,18 @@ def read_manifest(path: Path) -> list[Job]:
             raise SettingError(
                 f"{path}: the manifest cannot be read ({error!s:.200}); mend it"
             ) from error
+    named = {f"{kind} {n}": row for n, row in enumerate(rows, start=1)}
     try:
-        jobs = _ROWS.validate_python({f"{kind} {n}": row for n, row in enumerate(rows, start=1)})
+        jobs = _ROWS.validate_python(named, context=path.parent)
     except ValidationError as error:
         raise SettingError(f"{path}: {visible(first_misfit(error), 300)}") from error
-    return [row.job(path.parent) for row in jobs.values()]
+    return [
+        Job(
+            *(row.name, tuple(row.logs), tuple(row.loaded), row.profile, row.robot, row.time),
+            row.__pydantic_extra__,
+        )
+        for row in jobs.values()
+    ]
 
 
 def _cells(path: Path) -> list[dict[str, Any]]:
@@ -90,13 +98,11 @@ def label_of(value: object) -> Label:
     ValueError
         If it is neither text, a date, a truth value nor a number that a column can hold.
     """
-    if isinstance(value, date | clock):
-        return str(value)
-    if isinstance(value, str):
+    if isinstance(value, str | date | clock):
         with suppress(ValueError):
-            if math.isfinite(number := float(value)):
+            if math.isfinite(number := float(str(value))):
                 return number
-        return value
+        return str(value)
     if isinstance(value, int | float) and abs(value) < 2**63:
         return value
     raise ValueError("expected text, a date, true, false or a number below 2^63")
@@ -108,7 +114,17 @@ def _name(name: str) -> str:
     return name
 
 
-_Path = Annotated[str, Field(strict=True, pattern=r"^[^\x00]*[^\x00\s][^\x00]*$")]
+def _placed(path: str, manifest: ValidationInfo) -> str:
+    """A path of a manifest as seen from its folder."""
+    path = path.strip()
+    return path if "://" in path else str((manifest.context or Path()) / path)
+
+
+_Path = Annotated[
+    str,
+    Field(strict=True, pattern=r"^[^\x00]*[^\x00\s][^\x00]*$"),
+    AfterValidator(_placed),
+]
 _Paths = Annotated[
     list[_Path], BeforeValidator(lambda cell: cell.split(";") if isinstance(cell, str) else cell)
 ]
@@ -130,18 +146,6 @@ class _Row(BaseModel, extra="allow", coerce_numbers_to_str=True):
         if not (self.logs or self.loaded):
             raise ValueError("expected logs, or loaded ones")
         return self
-
-    def job(self, folder: Path) -> Job:
-        """The job, its paths as seen from `folder`."""
-
-        def placed(path: str) -> str:
-            path = path.strip()
-            return path if "://" in path else str(folder / path)
-
-        logs, loaded = (tuple(map(placed, paths)) for paths in (self.logs, self.loaded))
-        profile = self.profile and placed(self.profile)
-        labels = self.__pydantic_extra__
-        return Job(self.name, logs, loaded, profile, self.robot, self.time, labels)
 
 
 _ROWS = TypeAdapter(dict[str, _Row])

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import fnmatch
 import io
 import os
 import signal
 import threading
-import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -23,7 +23,7 @@ from algid.base.files import refuse_links, writing
 from algid.base.progress import Progress
 from algid.base.staging import TEMPORARY, delete_leftovers
 from algid.base.stores import Store, is_url
-from algid.batches.job import Task, is_full, redacted, run_task
+from algid.batches.job import Task, redacted, run_task
 from algid.batches.jobs import (
     FAILURES,
     FOLDER,
@@ -43,7 +43,6 @@ from algid.options import flag
 
 LOOK_EVERY = 2.0  # s, for logs that have arrived
 _STOP_EVERY = 0.1  # s, for a stop
-DYING = 2.0  # s that the processes of a killed batch may take to be gone
 
 
 @dataclass(frozen=True)
@@ -127,24 +126,15 @@ class Batch:
         """
         waiting, unreachable = deque[Task](), dict[str, JobRecord]()
         for task in map(self.task_of, jobs):
-            job, before = task.job, self.records.get(task.job.name)
-            if job.trouble is not None:
-                ended = task.record(JobStatus.FAILED, job.trouble)
-            elif before is None:
-                waiting.append(task)
+            name = task.job.name
+            try:
+                ended = self._standing(task, retry_failed)
+            except AlgidError as error:
+                unreachable[name] = task.record(JobStatus.FAILED, str(error))
                 continue
-            else:
-                try:
-                    why = self._why_anew(before, task, retry_failed)
-                except AlgidError as error:
-                    unreachable[job.name] = task.record(JobStatus.FAILED, str(error))
-                    continue
-                if why:
-                    self.anew[why] += 1
-                    waiting.append(task)
-                    continue
-                ended = replace(before, job=redacted(job))
-            if ended != before:
+            if ended is None:
+                waiting.append(task)
+            elif ended != self.records.get(name):
                 self._keep(ended)
         left = self._work(waiting)
         try:
@@ -185,7 +175,7 @@ class Batch:
                 now[job.name] = ()  # whoever reads it says why it cannot be looked at
                 with suppress(AlgidError):
                     now[job.name] = list(map(stat_of, self.task_of(job).files))
-                held = job.trouble or all(one.size for one in now[job.name])
+                held = all(one.size for one in now[job.name])
                 if held and now[job.name] == before.get(job.name):
                     settled.append(job)
             if settled:
@@ -194,24 +184,32 @@ class Batch:
             self.stop.wait(LOOK_EVERY)
         return ended
 
-    def _why_anew(self, record: JobRecord, task: Task, retry_failed: bool) -> str:
-        """Why a job that has ended is run anew; empty where its record stands.
+    def _standing(self, task: Task, retry_failed: bool) -> JobRecord | None:
+        """The record of a job that is not to be run; why one runs anew is counted.
 
         Raises
         ------
         AlgidError
-            If that cannot be known.
+            If it cannot be known whether logs and result are as they were.
         """
+        job, record = redacted(task.job), self.records.get(task.job.name)
+        if job.trouble is not None:
+            return task.record(JobStatus.FAILED, job.trouble)
+        if record is None:
+            return None
         if retry_failed and record.status in FAILURES:
-            return "failed before"
-        if record.basis != task.basis:
+            why = "failed before"
+        elif record.basis != task.basis:
             other = record.version != __version__
-            return f"of algid {record.version}" if other else "of other settings"
-        if record.has_result and not self.store.exists(f"{task.job.name}.algid/result.json"):
-            return "without their result"
-        inputs = tuple(map(stat_of, task.files))
-        same = (record.job.logs, record.inputs) == (redacted(task.job).logs, inputs)
-        return "" if same else "of other logs"
+            why = f"of algid {record.version}" if other else "of other settings"
+        elif record.has_result and not self.store.exists(f"{job.name}.algid/result.json"):
+            why = "without their result"
+        elif (record.job.logs, record.inputs) != (job.logs, tuple(map(stat_of, task.files))):
+            why = "of other logs"
+        else:
+            return replace(record, job=job)
+        self.anew[why] += 1
+        return None
 
     def _work(self, waiting: deque[Task]) -> int:
         """Run tasks; how many are left where the batch was stopped."""
@@ -246,29 +244,25 @@ class Batch:
             ended = future.result()
         except Exception as error:
             ended = error
-        if isinstance(ended, JobRecord):
-            return ended
         if isinstance(ended, WorkerDiedError) or type(ended).__name__ == "KilledWorker":  # Dask's
             return task.record(JobStatus.KILLED, f"it took its worker with it: {ended!s:.80}")
         if isinstance(ended, CallFailedError):
             return task.record(JobStatus.FAILED, str(ended))
-        if not isinstance(ended, str):  # no process can be started, a cluster is lost
+        if not isinstance(ended, JobRecord):  # no process can be started, a cluster is lost
             why = text_of(ended).removeprefix("Exception: ").partition("\n")[0]
-            ended = f"no worker can run jobs ({why})"
-        self._stop_because(ended)
+            self._stop_because(f"no worker can run jobs ({why})")
+        elif ended.verdict is None and _is_full(ended.reason):
+            self._stop_because(ended.reason)
+        else:
+            return ended
         return None
 
     def _keep(self, record: JobRecord) -> bool:
         """Write a record; where its job has no result now, the one of an earlier run goes."""
         name = record.job.name
-        before = self.records.get(name, record)
         try:
-            if before.has_result and not record.has_result:
+            if self.records.get(name, record).has_result and not record.has_result:
                 self.store.remove(f"{name}.algid")
-        except OutputError as error:
-            stays = f"; the result of an earlier run stays: {error}"
-            record = replace(record, reason=record.reason + stays)
-        try:
             write_record(self.store, record)
         except OutputError as error:
             self._stop_because(str(error))
@@ -279,9 +273,14 @@ class Batch:
         return True
 
     def _stop_because(self, reason: str) -> None:
-        remedy = "make room and run again" if is_full(reason) else "run again"
+        remedy = "make room and run again" if _is_full(reason) else "run again"
         self.stopped = self.stopped or f"{reason}; {remedy}: what is finished is kept"
         self.stop.set()
+
+
+def _is_full(text: str) -> bool:
+    """Whether a text says that there was no space left: libraries have exceptions of their own."""
+    return any(os.strerror(number) in text for number in (errno.ENOSPC, errno.EDQUOT))
 
 
 @contextmanager
@@ -307,19 +306,14 @@ def locked(out: str, shared: bool = False) -> Iterator[None]:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
     kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
-    until = time.monotonic() + DYING
     try:
-        while True:
-            try:
-                fcntl.flock(handle, kind | fcntl.LOCK_NB)
-                break
-            except BlockingIOError as error:
-                if time.monotonic() > until:
-                    raise OutputError(
-                        f"{out}: another batch is at work there; wait for it or choose another "
-                        f"{flag('out')}"
-                    ) from error
-                time.sleep(0.02)
+        try:
+            fcntl.flock(handle, kind | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise OutputError(
+                f"{out}: another batch is at work there; wait for it or choose another "
+                f"{flag('out')}"
+            ) from error
         yield
     finally:
         os.close(handle)

@@ -63,7 +63,7 @@ class Workers(ThreadPoolExecutor):
         self, workers: int, memory_limit: int | None = None, timeout: float | None = None
     ) -> None:
         super().__init__(workers)
-        self._timeout = timeout or 1e9
+        self._timeout = min(timeout or 1e6, 1e6)  # poll() takes no longer one
         self._slot = threading.local()  # each thread's own process and pipe
         self._started = list[subprocess.Popen[bytes]]()
         self._stopped = False
@@ -108,15 +108,15 @@ class Workers(ThreadPoolExecutor):
                 slot.pipe.recv()  # the time of imports is not the call's
             slot.pipe.send(call)
             end = time.monotonic() + self._timeout
-            while (left := end - time.monotonic()) > 0:
-                told = slot.pipe.recv() if slot.pipe.poll(min(left, 1e6)) else ""
-                if not isinstance(told, str):
-                    good, content = told
-                    if good:
-                        return content
-                    raise CallFailedError(content)
-                if told:
+            while slot.pipe.poll(max(0.0, end - time.monotonic())):
+                told = slot.pipe.recv()
+                if isinstance(told, str):
                     notes.take(told)
+                    continue
+                good, content = told
+                if good:
+                    return content
+                raise CallFailedError(content)
             slot.process.kill()
             reason = TOO_LONG.format(self._timeout)
         except (EOFError, ConnectionError):

@@ -146,7 +146,7 @@ BAD = {
         ("name,logs\nx,\n", "row 1: expected logs, or loaded ones"),
         ("name,logs,time\nx,a.csv,yesterday\n", "row 1.time: expected ISO 8601"),
         ("name,logs\na.algid/b,a.csv\n", "row 1.name: a job's name .* ends in .algid"),
-        (f"name,logs\n{'abc/' * 250}d,a.csv\n", "row 1.name: a job's name .* at most 1000 bytes"),
+        (f"name,logs\n{'abcd/' * 250}d,a.csv\n", "row 1.name: a job's name .* at most 1000 bytes"),
         (
             "name,logs,logs\nx,a.csv,b.csv\n",
             r"the manifest cannot be read \(two columns are named 'logs'\); mend it",

@@ -136,7 +136,7 @@ def test_what_else_lies_among_the_records_does_no_harm(logs: Path, kind: str) ->
 
 
 def test_no_job_takes_another_ones_place(tmp_path: Path) -> None:
-    assert "ends in .algid or .json" in (name_fault("x.json/y") or "")
+    assert "ends in .algid or .json or jobs.parquet" in (name_fault("x.json/y") or "")
     names = ["x", "x.json", "é/x", "x.jobs/y"]
     store = open_store(str(tmp_path))
     for name in names:
