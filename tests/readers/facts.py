@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import bz2
-import datetime
 import gzip
 import io
 import json
@@ -455,13 +454,10 @@ LEROBOT = {
 
 
 def zone_changes() -> Columns:
-    texts = []
-    for row in ROWS:
-        start = datetime.datetime(2026, 3, 4, 10 + (row >= HALF))
-        stamp = start + datetime.timedelta(microseconds=int(NS[row]) // 1000)
-        zone = "+01:00" if row >= HALF else "+00:00"
-        texts.append(stamp.isoformat(timespec="milliseconds") + zone)
-    return base(time=np.array(texts))
+    hours = np.where(FIRST_HALF, 10, 11).astype("timedelta64[h]")
+    stamps = np.datetime64("2026-03-04", "ms") + hours + (NS // 10**6).astype("timedelta64[ms]")
+    zones = np.where(FIRST_HALF, "+00:00", "+01:00")
+    return base(time=np.char.add(np.datetime_as_string(stamps), zones))
 
 
 def masked() -> Columns:

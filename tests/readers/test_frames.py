@@ -5,7 +5,6 @@ at other joints.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +20,6 @@ from algid.readers import read_log
 
 ROWS = 20_000
 """Samples that the message of other joints speaks of."""
-WRITERS: dict[str, Callable[[pl.DataFrame, Path], object]] = {
-    "parquet": pl.DataFrame.write_parquet,
-    "feather": pl.DataFrame.write_ipc,
-}
 
 
 def arm(rows: int = ROWS, joints: int = 3) -> pl.DataFrame:
@@ -42,14 +37,6 @@ def test_whole_stamps_in_lists_stay_exact() -> None:
     pairs = {"stamp_ns": [[stamp, 0] for stamp in stamps]}
     table = pa.table(pairs | dict.fromkeys(("q", "tau"), [[1.0, 2.0]] * 5))
     assert read_log(table, Profile(time="stamp_ns[0]")).stamp_ns.tolist() == stamps
-
-
-def test_more_columns_than_any_log_has_are_refused_in_every_format(tmp_path: Path) -> None:
-    frame = arm(3, 2).with_columns(pl.lit(0.0).alias(f"c{place}") for place in range(4093))
-    for form, write in WRITERS.items():
-        write(frame, tmp_path / f"log.{form}")
-        with pytest.raises(LogError, match="more than 4096 columns"):
-            read_log(tmp_path / f"log.{form}")
 
 
 SHORT = 300

@@ -46,15 +46,6 @@ def test_a_line_that_is_no_object_is_refused_with_its_number(wrong: str, tmp_pat
         read_log(path)
 
 
-@pytest.mark.parametrize("left", [1, 30, -1])
-def test_a_last_line_that_breaks_off_is_dropped_and_counted(left: int, tmp_path: Path) -> None:
-    log = read_log(lines(tmp_path, -1, lambda line: line[:left]))
-    assert np.array_equal(log.theta, LOG.theta[:, :59])
-    (notice,) = (notice for notice in log.notices if notice.lossy)
-    assert notice.code == "CUT_OFF"
-    assert notice.text == "the last row, row 60, breaks off and was dropped"
-
-
 @pytest.mark.parametrize(("opened", "closed"), [("[", "]"), ('{"a":', "}")])
 def test_lines_that_lie_deep_within_themselves_are_refused(
     opened: str, closed: str, tmp_path: Path

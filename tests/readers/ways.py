@@ -311,21 +311,7 @@ def _pandas(_: Path, log: Flat) -> pd.DataFrame:
 
 def _polars(_: Path, log: Flat) -> pl.DataFrame:
     _without_metadata(log)
-    columns: dict[str, Any] = {}
-    for name, values in log.columns.items():
-        if isinstance(values, Zoned):
-            columns[name] = pl.Series(values.stamps).dt.replace_time_zone("UTC")
-        elif isinstance(values, np.ma.MaskedArray):
-            columns[name] = pl.Series(values.tolist())
-        elif isinstance(values, list):
-            columns[name] = pl.Series(values)
-        elif values.dtype.byteorder == ">" or values.dtype.kind == "c":
-            raise CannotSayError
-        elif values.dtype == object:
-            columns[name] = pl.Series(list(values), strict=False)
-        else:
-            columns[name] = pl.Series(values)
-    return pl.DataFrame(columns)
+    return pl.DataFrame(pl.from_arrow(arrow_table(log)))
 
 
 def _arrays(_: Path, log: Flat) -> Callable[[], Log]:
