@@ -226,10 +226,14 @@ def choose(
             f"no columns of the joints {', '.join(joints)}; joints there are: "
             f"{', '.join(list(there)[:16]) or 'none that their names show'}"
         )
-    if passive and "tau1" not in chosen:
-        torque = _only_torque(parts, chosen.get(f"theta{3 - passive}"))
-        if torque is not None:
-            chosen[f"tau{3 - passive}"] = torque
+    if passive and "tau1" not in chosen:  # the driven joint's torque, or the only one
+        driven = chosen.get(f"theta{3 - passive}")
+        for stem in STEMS["tau"]:
+            torques = [column for column, name in parts.items() if name.stem == stem]
+            own = [one for one in torques if driven and parts[one].joint == parts[driven].joint]
+            if len(own or torques) == 1:
+                (chosen[f"tau{3 - passive}"],) = own or torques
+                break
     angles = [parts[chosen[name]].joint for name in ("theta1", "theta2") if name in chosen]
     for channel, column in list(chosen.items()):
         name = parts[column]
@@ -319,18 +323,6 @@ def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, s
         if name.joint and name.joint not in joints and (name.stem, name.topic) in kinds:
             others[name.own] = column
     return others
-
-
-def _only_torque(parts: Mapping[str, Name], angle: str | None) -> str | None:
-    """The torque of the joint with the angle, or the only torque; the other joint has none."""
-    for stem in STEMS["tau"]:
-        torques = [column for column, name in parts.items() if name.stem == stem]
-        if angle:
-            joint = parts[angle].joint
-            torques = [one for one in torques if parts[one].joint == joint] or torques
-        if len(torques) == 1:
-            return torques[0]
-    return None
 
 
 def time_among(columns: Iterable[str]) -> str | None:

@@ -77,12 +77,6 @@ def offer_table(table: TableFile, profile: Profile) -> Offered:
         for key, text in table.metadata.items()
         if not (key in table.schema.names and object_in(text))  # of the column alone
     }
-    gone = [name for name in table.companion.sums if name not in cells]
-    if gone:
-        raise LogError(
-            f"the columns {', '.join(gone)} that were written are not there: the file was "
-            "changed or damaged; write it again, or remove its truth if it was changed on purpose"
-        )
     by_user = {name: profile.channel(name).column for name in profile.channels}
     by_user["t"] = profile.time
     index = cells.get(INDEX)
@@ -131,7 +125,7 @@ def open_offered(path: str, offered: Offered, profile: Profile) -> TableReader:
         one = fields[source]
         mapping[name] = f"{one.topic}: {one.column}" if one.topic else source
         if not (one.is_number or (name == "t" and one.is_clock)):
-            held = str(one.type).removeprefix("large_").removesuffix("_view")[:80]
+            held = str(one.type)[:80]
             raise LogError(f"column {source!r} for {name} holds {held}; expected numbers")
     notices = list(offered.notices)
     named = all(profile.channel(name).column for name in profile.needed)
@@ -306,10 +300,8 @@ def samples(
     sources, time = {"t": column, **sources}, cells[column].type
     left = {name: sums[source] for name, source in sources.items() if source in sums}
     count = lost = done = 0
-    cut_off = False
     for batch in cell_batches(table, cells, sources):
         whole = batch
-        cut_off = any(len(values) and not values[-1].is_valid for values in batch.columns)
         if any(values.null_count for values in batch.columns):
             whole = batch.drop_null()  # it imports what plain rows do without
         count += batch.num_rows
@@ -342,18 +334,16 @@ def samples(
             told.append(Notice("OTHER_UNIT", numbers=numbers, remedies=(other,)))
         done += times.size
         yield SampleTable(stamps, channels)
-    if lost and lost == count and not (lost == 1 and cut_off):
+    if lost and lost == count:
         raise LogError(
             "no row has a value in every column that is needed; put the signals on common stamps"
         )
-    if lost == 1 and cut_off:
-        told.append(Notice("CUT_OFF", numbers={"case": "row", "row": count}))
-    elif lost and clock.rate is not None:
+    if lost and clock.rate is not None:
         raise LogError(
             "rows lack a value, and without a time the rows behind them have none; "
             "fill the cells, or add a column of times"
         )
-    elif lost:
+    if lost:
         numbers = {"case": "empty", "count": lost, "rows": count}
         told.append(Notice("NOT_FINITE", numbers=numbers))
     wrong = [name for name, rest in left.items() if rest]

@@ -113,14 +113,10 @@ def with_profile(log: Log, profile: Profile | None) -> Log:
                 f"{name}: {log.origin.path} has been read already; give it to algid.read_log"
             )
     columns = {"t": log.stamp_ns}
-    for names, values in (
-        (("theta1", "theta2"), log.theta),
-        (("tau1", "tau2"), log.tau),
-        (("omega1", "omega2"), log.omega),
-        (("q_des1", "q_des2"), log.reference),
-    ):
-        if values is not None:
-            columns |= zip(names, values, strict=True)
+    signals = {"theta": log.theta, "tau": log.tau, "omega": log.omega, "q_des": log.reference}
+    for quantity, values in signals.items():
+        for joint, row in enumerate(() if values is None else values, start=1):
+            columns[f"{quantity}{joint}"] = row
     accept = set(profile.accept) | set(reading.accepted)
     if not (profile.channel("theta1").unit or profile.channel("theta2").unit):
         accept.add("DEGREES")  # a log's angles are in rad, however far joints turn

@@ -280,11 +280,8 @@ def _spoken(table: TableFile) -> tuple[str, list[str]]:
     """
     for one in table.schema:
         if one.name.lower() in LABELS and is_list(one.type) and is_text(one.type.value_type):
-            for batch in table.batches([one.name]):
-                for row in batch.column(0):
-                    if len(row.as_py() or ()) > 1:
-                        return one.name, row.as_py()
-            return one.name, []
+            rows = (row.as_py() for batch in table.batches([one.name]) for row in batch.column(0))
+            return one.name, next((row for row in rows if len(row or ()) > 1), [])
     return "", []
 
 
@@ -343,11 +340,7 @@ def groups_in(table: TableFile) -> Iterator[Notice]:
 
     for one in table.schema:
         if one.name.lower() in GROUPS and not pa.types.is_nested(one.type):
-            found: set[object] = set()
-            for value in _values(table, one.name):
-                found.add(value)
-                if len(found) > LIMITS.joints:
-                    break
+            found = set(_values(table, one.name))
             if len(found) > 1:
                 yield several(one.name, found)
 

@@ -35,12 +35,6 @@ def states(folder: Path, *texts: str) -> Path:
     return json_mcap(folder, zip(LOG.stamp_ns.tolist(), texts, strict=True))
 
 
-def test_a_table_cut_within_its_last_row_lacks_that_row(tmp_path: Path) -> None:
-    found = read_log(csv(tmp_path, HEAD, *ROWS[:-1], "0.39,4,4,", ""))
-    (cut,) = (one for one in found.notices if one.code == "CUT_OFF")
-    assert (len(found), cut.numbers["row"], cut.lossy) == (39, 40, True)
-
-
 def test_header_stamps_that_messages_lack_are_refused(tmp_path: Path) -> None:
     path = states(tmp_path, *(json.dumps(one | {"header": {}}) for one in STATES))
     with pytest.raises(LogError, match=r"'/arm' carry no stamp: .*--set clock=log"):
