@@ -13,6 +13,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from algid.base.errors import LogError
@@ -205,16 +206,28 @@ def cells_of(table: TableFile) -> dict[str, Cell]:
         said = fills | own
         if one.name == label:
             continue
-        if joints and is_list(one.type) and _is_quantity(one.name):
+        lists: Any = _lists(_whole(one.name), one.type) if is_list(one.type) else None
+        if joints and lists is not None and _is_quantity(one.name):
+            called = _lists(_whole(label), table.schema.field(label).type)
             for joint in joints[: LIMITS.joints]:
-                called = _lists(_whole(label), table.schema.field(label).type)
-                mine = called.eval(pl.element() == joint).list
-                numbers = _lists(_whole(one.name), one.type)
-                alike = numbers.len() == called.len()
-                at = pl.when(mine.any() & alike).then(mine.arg_max())
-                number = numbers.get(at, null_on_oob=True)
+                number = _beside(joint, called, lists)
                 cell = Cell((one.name, label), one.type.value_type, number, joint)
                 cells[f"/{label}/{joint}/{one.name}"] = _marked(cell, said)
+            continue
+        # structures may come in any order, too, where they have a name of their own
+        inner = one.type if lists is None else one.type.value_type
+        fields = [*inner] if lists is not None and pa.types.is_struct(inner) else []
+        names = [field.name for field in fields if field.name.lower() in LABELS]
+        if names and is_text(inner.field(names[0]).type):
+            known = frame[one.name].explode().struct.field(names[0]).drop_nulls()
+            known = known.unique(maintain_order=True)[: LIMITS.joints]
+            called = lists.eval(pl.element().struct.field(names[0])).list
+            for joint, field in product(known, fields):
+                number = _beside(
+                    joint, called, lists.eval(pl.element().struct.field(field.name)).list
+                )
+                cell = Cell((one.name,), field.type, number, joint)
+                cells[f"/{one.name}/{joint}/{field.name}"] = _marked(cell, said)
             continue
         named = [text[key] for text in (own, metadata) for key in LABELS if key in text]
         names = next(filter(None, map(_names, named)), [])
@@ -264,6 +277,16 @@ def _within(
 
 
 _PLACE = re.compile(r"(.+)\[(\d+)\]")
+
+
+def _beside(joint: str, called: Any, numbers: Any) -> pl.Expr:
+    """In each row the number at the place of a joint's name, null where there is none."""
+    import polars as pl
+
+    mine = called.eval(pl.element() == joint).list
+    at = pl.when(mine.any() & (numbers.len() == called.len())).then(mine.arg_max())
+    number: pl.Expr = numbers.get(at, null_on_oob=True)
+    return number
 
 
 def _is_quantity(name: str) -> bool:

@@ -98,3 +98,14 @@ def test_checksums_of_parquet_pages_are_verified(tmp_path: Path) -> None:
     path.write_bytes(content)
     with pytest.raises(LogError, match="CRC checksum"):
         read_log(path)
+
+
+def test_structures_of_a_list_are_known_by_their_names_in_any_order() -> None:
+    rows = []
+    for row in range(50):
+        joints = [{"name": one, "position": float(row), "effort": 0.1 * row} for one in "ab"]
+        joints[1]["position"] = -float(row)
+        rows.append(joints[:: -1 if row % 3 else 1])
+    log = read_log(pa.table({"t": np.arange(50) * 1e-3, "joints": rows}))
+    assert np.array_equal(log.theta, np.outer([1, -1], np.arange(50)))
+    assert log.origin.mapping["tau2"] == "/joints/b/effort"

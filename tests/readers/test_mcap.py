@@ -7,17 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from rosbags import rosbag1
 
 from algid.base.errors import LogError
-from algid.base.ros2 import JOINT_STATE
-from algid.inspection.checks import inspect_log
 from algid.profile import Profile
 from algid.readers import read_log
 from tests.readers.logs import EPOCH_NS, noise_log, same
-from tests.readers.mcaps import ANY, STORES, TOPIC, messages_of, state_of, write_mcap
+from tests.readers.mcaps import messages_of, write_mcap
 from tests.readers.ways import Message, States, sent, written
 
 LOG = noise_log(400, start_ns=EPOCH_NS, velocity=False)
@@ -71,21 +67,6 @@ def test_xcdr2_is_refused(tmp_path: Path) -> None:
         read_log(tmp_path / "log.mcap")
 
 
-def test_a_torque_beside_one_of_zeros_is_taken_by_its_topic_and_field(tmp_path: Path) -> None:
-    path, messages = tmp_path / "log.mcap", messages_of(replace(LOG, tau=0 * LOG.tau))
-    for stamp, torque in zip(LOG.stamp_ns.tolist(), LOG.tau[0].tolist(), strict=True):
-        wrench = {"wrench": {"force": {"z": 1.0}, "torque": {"z": torque}}}
-        messages.append(("/ft", stamp, json.dumps(wrench).encode()))
-    write_mcap(path, messages, {"/ft": ANY})
-    found = inspect_log(path).findings
-    zeros = [one.remedies[0].settings for one in found if one.code == "EFFORT_ZERO"]
-    assert zeros == [{"tau1.source": None}, {"tau2.source": None}]
-    named = {"tau1": {"topic": "/ft", "source": "wrench.torque.z"}}
-    log = read_log(path, Profile.model_validate(named))
-    assert np.array_equal(log.tau[0], LOG.tau[0])
-    assert log.origin.reading.clock == "log"  # which both topics have
-
-
 def test_units_that_differ_between_the_files_of_a_recording_are_refused(tmp_path: Path) -> None:
     for number, unit in enumerate(("N m", "mN m")):
         part = messages_of(LOG.part(200 * number, 200 * (number + 1)))
@@ -93,23 +74,3 @@ def test_units_that_differ_between_the_files_of_a_recording_are_refused(tmp_path
         write_mcap(tmp_path / f"log_{number}.mcap", part, metadata=said)
     with pytest.raises(LogError, match=r"log_1\.mcap states other units \(tau1 in mN m, .*N m\); "):
         read_log(tmp_path)
-
-
-@pytest.mark.parametrize(("second", "told"), [("j1 j2", True), ("g1 g2", False)])
-def test_two_publishers_of_the_same_joints_are_told(
-    second: str, told: bool, tmp_path: Path
-) -> None:
-    path, names = tmp_path / "log.bag", ("j1 j2", second)
-    with rosbag1.Writer(path) as bag:
-        publishers = []
-        for node in "ab":
-            one = bag.add_connection(TOPIC, JOINT_STATE, typestore=STORES[0], callerid=node)
-            publishers.append(one)
-        for row, stamp in enumerate(LOG.stamp_ns.tolist()):
-            for late, publisher in enumerate(publishers):
-                own = names[late].split(), [row, 2 * row], (), [1, row]
-                state = state_of(STORES[0], stamp + 500_000 * late, *own, seq=row)
-                data = STORES[0].serialize_ros1(state, JOINT_STATE)
-                bag.write(publisher, stamp, bytes(data))
-    said = [one.text for one in read_log(path, Profile(joints=("j1", "j2"))).notices]
-    assert [f"'publisher of {TOPIC}' has the values 0 and 1" in one for one in said] == [told]

@@ -58,12 +58,6 @@ def lost(found: Log) -> dict[str, str]:
     return {notice.code: notice.text for notice in found.notices if notice.lossy}
 
 
-def flipped(content: bytes, value: float) -> bytes:
-    """The content with a bit of a number turned over."""
-    place = content.index(struct.pack("<d", value))
-    return poked(content, place, "<B", content[place] ^ 1)
-
-
 def summary_of(content: bytes) -> int:
     """Where the summary begins."""
     return int(struct.unpack_from("<Q", content, len(content) - 28)[0])
@@ -228,20 +222,6 @@ def test_what_lies_behind_the_last_whole_record_is_called_cut(tmp_path: Path) ->
     two = f"at byte {len(whole) - 8}: {len(whole) + 8:,} bytes"
     for content, words in ((cut, "breaks off behind its last whole record"), (whole * 2, two)):
         assert words in lost(beginning(path, content))["CUT_OFF"]
-
-
-def test_a_chunk_of_which_the_statistics_alone_know_is_missed(tmp_path: Path) -> None:
-    path = tmp_path / "log.mcap"
-    whole = made(path, LOG)
-    chunk = chunks_of(path)[1]
-    start = chunk.chunk_start_offset
-    gone = chunk.chunk_length + chunk.message_index_length
-    unlisted = summarised(whole, without(ChunkIndex), checksum=False)
-    unlisted = poked(unlisted, -28, "<Q", summary_of(whole) - gone)
-    path.write_bytes(unlisted[:start] + unlisted[start + gone :])
-    found = read_log(path)
-    assert 0 < len(found) < len(LOG)
-    assert lost(found) == {"DAMAGED": f"the file counts {len(LOG)} messages and holds {len(found)}"}
 
 
 BARE = {"compression": PLAIN}

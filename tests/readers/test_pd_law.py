@@ -54,12 +54,8 @@ def test_a_joint_that_counts_the_other_way_has_its_law_in_its_own_coordinates() 
 )
 def test_a_law_that_lacks_something_has_one_line(law: dict[str, object], told: str) -> None:
     with pytest.raises(LogError, match=told) as raised:
-        read_log(LOG, profile(tau1=law) if "q_des" in law else profile_without_first(law))
+        read_log(LOG, profile(tau1=law))
     assert "\n" not in str(raised.value)
-
-
-def profile_without_first(law: dict[str, object]) -> Profile:
-    return with_settings(Profile(), {"tau1": law, "tau2": LAWS["tau2"]})
 
 
 def test_without_velocities_a_law_differentiates_the_angles() -> None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from algid.arm import FloatArray
 from algid.log import Log, Origin
@@ -79,26 +79,17 @@ def test_one_that_wraps_follows_its_angle() -> None:
 @pytest.mark.parametrize("field", ["reference", "desired"])
 def test_a_trajectory_controller_tells_it(field: str, tmp_path: Path) -> None:
     """At a rate of its own and for a part of the log; joints in another order; nothing is lost."""
-    kind, topic = "control_msgs/msg/JointTrajectoryControllerState", "/arm_controller/state"
-    point = "trajectory_msgs/msg/JointTrajectoryPoint"
-    text = f"std_msgs/Header header\nstring[] joint_names\n{point} {field}\n"
-    types = get_typestore(Stores.ROS2_HUMBLE)
-    types.register(get_types_from_msg(text, kind))
-    log = Log(10**9 + np.arange(300) * 10_000_000, THETA, TAU, Origin("", "", {}))
-    messages = messages_of(log, names=["hip", "knee"])
-    time, span = (types.types[f"builtin_interfaces/msg/{name}"] for name in ("Time", "Duration"))
-    none = np.empty(0)
+    topic, stamps = "/arm_controller/state", 10**9 + np.arange(300) * 10_000_000
+    messages = messages_of(Log(stamps, THETA, TAU, Origin("", "", {})), names=["hip", "knee"])
     for step in range(40, 201, 4):
-        asked = np.array([REFERENCE[1, step], T[step], REFERENCE[0, step]])
-        wanted = types.types[point](asked, none, none, none, span(0, 0))
-        stamp = time(*divmod(int(log.stamp_ns[step]), 10**9))
-        head = types.types["std_msgs/msg/Header"](stamp, "")
-        state = types.types[kind](head, ["knee", "wrist", "hip"], wanted)
-        data = bytes(types.serialize_cdr(state, kind))
-        messages.append((topic, int(log.stamp_ns[step]), data))
-    definition, _ = types.generate_msgdef(kind, ros_version=2)
+        sec, nanosec = divmod(int(stamps[step]), 10**9)
+        asked = [REFERENCE[1, step], T[step], REFERENCE[0, step]]
+        state: dict[str, Any] = {"header": {"stamp": {"sec": sec, "nanosec": nanosec}}}
+        state |= {"joint_names": ["knee", "wrist", "hip"], field: {"positions": asked}}
+        messages.append((topic, int(stamps[step]), json.dumps(state).encode()))
     messages.sort(key=lambda one: one[1])
-    write_mcap(tmp_path / "log.mcap", messages, {topic: (kind, "ros2msg", definition.encode())})
+    kind = "control_msgs/JointTrajectoryControllerState", "jsonschema", b""
+    write_mcap(tmp_path / "log.mcap", messages, {topic: kind})
     found = read_log(tmp_path / "log.mcap")
     assert len(found) == len(T)
     # linear interpolation over 40 ms of cos 2t: at most 4 × 0.04² / 8
