@@ -238,9 +238,6 @@ def _named(bounds: Sequence[BrokenBound]) -> list[str]:
     return names
 
 
-_SINGULAR = 1e-9  # of the largest eigenvalue of a correlation matrix
-
-
 _RATIOS = np.geomspace(1e-3, 1e3, 1001)
 """Between the constants of two joints' equations: steps of 1.4 %."""
 
@@ -347,10 +344,12 @@ def payload_distance(fit: Fit) -> float | None:
     if not (fit.shared.payload and unloaded and loaded):
         return None
     bare, burdened = alone(fit.shared, unloaded), alone(fit.shared, loaded)
-    for own in (bare, burdened):
-        if own.unidentifiable or _singular(own.covariance):
-            return None
-    freedom = len(fit.shared.log_names) - (len(fit.shared.names) - len(fit.shared.log_names))
+    constants = len(fit.shared.log_names)
+    if bare.unidentifiable or burdened.unidentifiable:
+        return None
+    if min(sum(len(log.S) for log in own) for own in (unloaded, loaded)) <= constants:
+        return None
+    freedom = 2 * constants - len(fit.shared.names)
     arm = Prior.of(bare.names, bare.values, bare.covariance)
     S = scaled_pinv(burdened.covariance)
     nothing = np.zeros_like(burdened.values)
@@ -358,17 +357,6 @@ def payload_distance(fit: Fit) -> float | None:
     _, _, value = combine(fit.shared, [information], fit.values, arm)
     tail = max(float(chi2_tail(freedom, max(0.0, -2 * value))), _LEAST_TAIL)
     return max(0.0, normal_exceeded(tail))
-
-
-def _singular(covariance: FloatArray) -> bool:
-    """Whether a covariance, scaled to unit diagonal, has directions without a variance."""
-    std = np.sqrt(np.diag(covariance))
-    known = std > 0
-    if not known.any():
-        return True
-    correlation = covariance[np.ix_(known, known)] / np.outer(std[known], std[known])
-    values = np.linalg.eigvalsh(correlation)
-    return bool(values[0] < _SINGULAR * values[-1])
 
 
 def repeatability(fit: Fit) -> tuple[FloatArray, float, tuple[float, float]] | None:

@@ -90,7 +90,6 @@ class LogEvidence:
     ----------
     source : callable that gives a fresh pass over the log's segments
     loaded : bool
-    shared : Shared
     shift : TorqueShift
         After how long a logged torque acts; its delay is where none is estimated.
     known : NoiseLevels or None
@@ -105,14 +104,12 @@ class LogEvidence:
         self,
         source: Source,
         loaded: bool,
-        shared: Shared,
         shift: TorqueShift,
         known: NoiseLevels | None,
     ) -> None:
         self.loaded = loaded
         self.sure = self.smooth = self.by_motion = False
         self._source = source
-        self._shared = shared
         self._shift = shift
         self._known = known
         kept, self.whole = spread_pieces(self._pieces(), _TRAINED, PIECE_SAMPLES)
@@ -166,18 +163,18 @@ class LogEvidence:
         """Forget what was trained since the log had this `state`."""
         self.noise, self._trajectories, self.sure = state[0], list(state[1]), False
 
-    def train(self, c: FloatArray, *, free: bool = True) -> Outcome:
-        """Linearise the training set at the coefficients `c`.
+    def train(self, shared: Shared, beta: FloatArray, *, free: bool = True) -> Outcome:
+        """Linearise the training set at the parameters `beta` (Q,) of `shared`.
 
         Keeps the trajectories found, and, where they are `free`, better noise levels, which the
         trajectories and the score follow. Levels that are known, or sure, stay.
         """
-        gathered = _Gathered()
+        gathered, c = _Gathered(), shared.coefficients(beta, self.loaded)
         scores: list[VarianceScore] = []
         responses: list[FloatArray] = []
         scored = free and self._known is None and not self.sure
         for seed, (piece, theta) in enumerate(zip(self.kept, self._trajectories, strict=True)):
-            linear = self._linearise(c, theta, piece)
+            linear = self._linearise(shared, c, theta, piece)
             asked = linear.columns if scored else linear.columns[-1:]
             multipliers = linear.solve_transposed(asked)
             self._trajectories[seed] = trajectory(piece, linear, multipliers[-1], self.noise)
@@ -200,27 +197,27 @@ class LogEvidence:
         information = gathered.followed(outcome.information, followed, score)
         return replace(outcome, information=information, noise_change=largest_change(step, score))
 
-    def shaped(self, shared: Shared, c: FloatArray) -> Outcome:
-        """Pass over the training set at `c` with friction of another shape; trajectories stay."""
-        gathered = _Gathered()
+    def held(self, shared: Shared, beta: FloatArray) -> Outcome:
+        """Pass over the training set at `beta`; trajectories and noise levels stay."""
+        gathered, c = _Gathered(), shared.coefficients(beta, self.loaded)
         for piece, theta in zip(self.kept, self._trajectories, strict=True):
-            gathered.take(self._linearise(c, theta, piece, shared), piece.dt, self.noise)
+            gathered.take(self._linearise(shared, c, theta, piece), piece.dt, self.noise)
         return gathered.outcome(self.loaded, c)
 
-    def reshape(self, shared: Shared) -> None:
-        """From here on friction has the shape of `shared`; noise levels start where they did."""
-        self._shared = shared
+    def forget_noise(self) -> None:
+        """Noise levels start where they did."""
         self.noise, self.sure = self._known or self._guess, False
 
-    def run(self, c: FloatArray) -> Outcome:
-        """Pass over the whole log at the coefficients `c`; each piece has its own trajectory."""
-        gathered = _Gathered()
+    def run(self, shared: Shared, beta: FloatArray) -> Outcome:
+        """Pass over the whole log at `beta`; each piece has its own trajectory."""
+        gathered, c = _Gathered(), shared.coefficients(beta, self.loaded)
         for piece in self._pieces():
             start = first_trajectory(piece.theta, piece.dt)
-            first = self._linearise(c, start, piece, residual_only=True)
+            first = self._linearise(shared, c, start, piece, residual_only=True)
             multiplier = first.solve_transposed(first.columns[-1:])[0]
             theta = trajectory(piece, first, multiplier, self.noise)
-            gathered.take(self._linearise(c, theta, piece), piece.dt, self.noise, at_once=True)
+            linear = self._linearise(shared, c, theta, piece)
+            gathered.take(linear, piece.dt, self.noise, at_once=True)
         return gathered.outcome(self.loaded, c)
 
     @property
@@ -236,7 +233,7 @@ class LogEvidence:
         """
         gram, determinant, model = np.zeros(()), 0.0, shared.model
         for piece, theta in zip(self.kept, self._trajectories, strict=True):
-            linear = self._linearise(c, theta, piece, shared)
+            linear = self._linearise(shared, c, theta, piece)
             made = beside(model, c[: len(model.names)], linear.motion, piece.dt)
             rows = (made / self.noise.tau[None, :, None]).swapaxes(1, 2)
             rows = np.ascontiguousarray(rows).reshape(rows.shape[0], -1)
@@ -255,23 +252,24 @@ class LogEvidence:
 
     def _linearise(
         self,
+        shared: Shared,
         c: FloatArray,
         theta: FloatArray,
         piece: Segment,
-        shared: Shared | None = None,
         *,
         residual_only: bool = False,
     ) -> Linearised:
-        shared = self._shared if shared is None else shared
-        smooth = None
+        smooth, shift = None, self._shift
         if self.smooth and not residual_only:
             smooth = first_trajectory(theta, piece.dt)
+        if shared.delay:
+            shift = replace(shift, delay=float(c[-1]))
         return linearise(
             shared.model,
             c[: len(shared.model.names)],
             theta,
             piece,
-            self._stencil(shared, piece.dt, c),
+            Stencil(piece.dt, shift.at(piece.dt), held=shift.held, lag=shared.model.lag(c)),
             self.noise,
             shared.delay,
             residual_only=residual_only,
@@ -279,15 +277,8 @@ class LogEvidence:
             by_motion=self.by_motion,
         )
 
-    def _stencil(self, shared: Shared, dt: float, c: FloatArray) -> Stencil:
-        """The stencil for samples `dt` s apart at coefficients c (q,)."""
-        shift = self._shift
-        if shared.delay:
-            shift = replace(shift, delay=float(c[-1]))
-        return Stencil(dt, shift.at(dt), held=shift.held, lag=shared.model.lag(c))
 
-
-def opened(problem: Problem, shared: Shared, noise: NoiseLevels | None = None) -> list[LogEvidence]:
+def opened(problem: Problem, noise: NoiseLevels | None = None) -> list[LogEvidence]:
     """The logs that are long enough.
 
     Raises
@@ -298,7 +289,7 @@ def opened(problem: Problem, shared: Shared, noise: NoiseLevels | None = None) -
     logs: list[LogEvidence] = []
     shift = problem.settings.shift
     for loaded, sources in problem.kinds():
-        every = [LogEvidence(one, loaded, shared, shift, noise) for one in sources]
+        every = [LogEvidence(one, loaded, shift, noise) for one in sources]
         kept = [log for log in every if log.kept]
         if not kept:
             kind = "loaded" if loaded else "unloaded"

@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray, keep_arrays
 from algid.base.compiled import chi2_tail
-from algid.base.names import places_outside, vector
+from algid.base.names import places_outside, vector, within
 from algid.estimators.combine import scaled_pinv
 from algid.estimators.hold import Lateness
 from algid.estimators.log_likelihood import Beside, LogEvidence
@@ -82,16 +82,20 @@ def widened(model: Model, c: FloatArray, motion: Motion, _dt: float) -> FloatArr
     return np.stack(rows)
 
 
+At = Mapping[bool, Mapping[str, float]]
+"""Coefficients by name, of unloaded and of loaded logs."""
+
+
 class Products:
     """Normal equations of one pass of the likelihood, with the columns of every term.
 
     Parameters
     ----------
     logs : Sequence of LogEvidence
-    shared : Shared
-        Whose coefficients `at` are.
-    at : coefficients (q,) of unloaded and of loaded logs
-        Where it is linearised; those of other terms are zero.
+    model : Model
+        A lag is among the terms if it is one of the model's.
+    at : coefficients by name, of unloaded and of loaded logs
+        Where it is linearised; others are zero.
     base : float, s
         The delay from which the column of the delay counts.
     beside : Beside
@@ -104,19 +108,18 @@ class Products:
     def __init__(
         self,
         logs: Sequence[LogEvidence],
-        shared: Shared,
-        at: Mapping[bool, FloatArray],
+        model: Model,
+        at: At,
         base: float,
         beside: Beside = widened,
     ) -> None:
-        own = shared.model.terms
-        every = tuple(name for name, term in TERMS.items() if not term.lags or name in own)
-        self.shared = Shared(replace(shared.model, terms=every), delay=True)
+        every = tuple(name for name, term in TERMS.items() if not term.lags or name in model.terms)
+        self.shared = Shared(replace(model, terms=every), delay=True)
         self.names = self.shared.log_names + WIDTHS
-        loads = loads_of(self.shared.model)
-        self._rigid = np.flatnonzero([name in loads for name in self.names])
-        self._both = len({log.loaded for log in logs}) == 2
-        self.size = len(self.names) + self._both * len(self._rigid)
+        rigid = within(self.names, loads_of(self.shared.model))
+        both = len({log.loaded for log in logs}) == 2
+        self._labels = np.array(self.names + both * rigid)
+        self.size = len(self._labels)
         self._base = base
         self.determinant = 0.0
         self.each: list[tuple[bool, FloatArray]] = []
@@ -125,8 +128,7 @@ class Products:
             any(np.any(piece.tau[joint]) for log in logs for piece in log.kept) for joint in (0, 1)
         ]
         for log in logs:
-            known = dict(zip(shared.log_names, at[log.loaded].tolist(), strict=True))
-            c = vector(self.names, {DELAYS[0]: base, **known}, otherwise=0.0)
+            c = vector(self.names, {DELAYS[0]: base, **at[log.loaded]}, otherwise=0.0)
             gram, determinant = log.products(self.shared, c[:q], beside)
             if not all(driven):
                 # where a joint has no motor, its gain is nothing and makes its equation vanish
@@ -152,9 +154,9 @@ class Products:
 
     def _places(self, loaded: bool) -> NDArray[np.int64]:
         """Where a log's coefficients and widths stand in p."""
-        places = np.arange(len(self.names))
-        if loaded and self._both:
-            places[self._rigid] = len(self.names) + np.arange(len(self._rigid))
+        places, apart = np.split(np.arange(self.size), [len(self.names)])
+        if loaded:
+            places[np.isin(self.names, self._labels[apart])] = apart
         return places
 
     def columns(self, terms: Iterable[str]) -> NDArray[np.int64]:
@@ -169,10 +171,7 @@ class Products:
 
     def _named(self, names: Collection[str]) -> NDArray[np.int64]:
         """Places in p of coefficients by name, the loaded arm's with them."""
-        wanted = np.array([name in names for name in self.names])
-        if self._both:
-            wanted = np.append(wanted, wanted[self._rigid])
-        return np.flatnonzero(wanted)
+        return np.flatnonzero(np.isin(self._labels, list(names)))
 
     def solve(self, columns: NDArray[np.int64]) -> tuple[FloatArray, float, FloatArray]:
         """Least squares on `columns`: p (P,), the squares left, and the inverse of its matrix."""
@@ -182,13 +181,13 @@ class Products:
         left = float(self.total[-1, -1] - p[columns] @ self.total[columns, -1])
         return p, max(left, 0.0), inverse
 
-    def coefficients(self, p: FloatArray) -> dict[bool, FloatArray]:
-        """Coefficients (q,) of unloaded and of loaded logs, the delay whole."""
+    def coefficients(self, p: FloatArray) -> At:
+        """Coefficients by name of unloaded and of loaded logs, the delay whole."""
         at = {}
         for loaded in (False, True):
-            c = p[self._places(loaded)][: len(self.shared.log_names)]
-            c[-1] += self._base
-            at[loaded] = c
+            c = p[self._places(loaded)].tolist()
+            at[loaded] = dict(zip(self.shared.log_names, c, strict=False))
+            at[loaded][DELAYS[0]] += self._base
         return at
 
     def mean_square(self, columns: NDArray[np.int64]) -> float:

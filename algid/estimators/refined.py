@@ -97,7 +97,7 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
         )
     start, prior, progress = weak_fit(problem), problem.prior, problem.progress
     shared, anchored = start.shared, _anchored(start)
-    logs = opened(problem, shared, noise)
+    logs = opened(problem, noise)
     turn, dt = max((largest_turn(log.kept), log.kept[0].dt) for log in logs)
     if turn > FAR:
         numbers = {"case": "turn", "kept": start.estimator, "turn": turn, "rate": turn / FAR / dt}
@@ -145,9 +145,12 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
         tested = evenly_spread(logs, _MOST_TESTED)
         for log in tested:
             log.smooth, log.by_motion = True, not attributes(shared.model, "elastic")
-        at = {log.loaded: shared.coefficients(fitted.values, log.loaded) for log in tested}
+        at = {}
+        for log in tested:
+            c = shared.coefficients(fitted.values, log.loaded)
+            at[log.loaded] = dict(zip(shared.log_names, c.tolist(), strict=True))
         try:
-            products = Products(tested, shared, at, problem.settings.shift.delay, shapes)
+            products = Products(tested, shared.model, at, problem.settings.shift.delay, shapes)
             p_value = misfit(tested, (log.noise.tau for log in tested), fitted, products)
         except np.linalg.LinAlgError:  # of joints that never move
             return given_up("not converged")
@@ -230,7 +233,7 @@ def _train(
         done = 0
         free = not known and iteration <= _NOISE_STEPS
         for log in logs:
-            outcomes.append(log.train(shared.coefficients(beta, log.loaded), free=free))
+            outcomes.append(log.train(shared, beta, free=free))
             done += log.trained
             if progress is not None:
                 progress(f"fitting, step {iteration}", done, total)
@@ -293,7 +296,7 @@ def _settled_width(
     def profile(width: float) -> tuple[float, FloatArray]:
         other = replace(shared, model=replace(shared.model, coulomb_speed=width))
         try:
-            seen = [log.shaped(other, other.coefficients(beta, log.loaded)) for log in logs]
+            seen = [log.held(other, beta) for log in logs]
         except np.linalg.LinAlgError:  # so narrow a step does not go with the trajectories
             return np.inf, beta
         informations = [outcome.information for outcome in seen]
@@ -312,12 +315,11 @@ def _settled_width(
         states = [log.state for log in logs]
         shared = replace(shared, model=replace(shared.model, coulomb_speed=width.value))
         for log in logs:
-            log.reshape(shared)
+            log.forget_noise()
         beta, outcomes, _, end = _train(shared, logs, beta, prior, progress)
         if end == "unsettled" and was_settled:  # the step is too narrow for the motion
             shared, beta, outcomes = before
             for log, state in zip(logs, states, strict=True):
-                log.reshape(shared)
                 log.restore(state)
             return shared, beta, outcomes, "settled", width
         if end != "settled":
@@ -330,7 +332,7 @@ def _finish(
 ) -> tuple[FloatArray, list[Outcome]]:
     """Passes over whole logs until the step is one that a single Gauss-Newton step can make."""
     for _ in range(_PASSES):
-        outcomes = [log.run(shared.coefficients(beta, log.loaded)) for log in logs]
+        outcomes = [log.run(shared, beta) for log in logs]
         better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, prior)
         share = sum(log.trained for log in logs)
         far = _distance(better - beta, S) * np.sqrt(share / max(share, _count(outcomes)))

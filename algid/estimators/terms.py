@@ -27,9 +27,9 @@ both kinds determine it and no payload need be guessed.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
@@ -40,10 +40,9 @@ from algid.base.names import evenly_spread, outside, vector, within
 from algid.base.significance import level
 from algid.estimators import weak
 from algid.estimators.hold import SURE, Hold, Lateness
-from algid.estimators.log_likelihood import LogEvidence, opened
-from algid.estimators.misfit import Products, misfit
+from algid.estimators.log_likelihood import opened
+from algid.estimators.misfit import At, Products, misfit
 from algid.estimators.modulating_functions import Known, row_weights
-from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
 from algid.model import (
     CHOICES,
@@ -175,16 +174,12 @@ def _spread(sources: Sequence[Source]) -> list[_Piece]:
     return logs
 
 
-Elastic = Mapping[bool, Mapping[str, float]]
-"""Coefficients by name, of unloaded and of loaded logs, of an arm whose joints are elastic."""
-
-
 def _start(
-    kinds: Sequence[Sequence[_Piece]], settings: WeakSettings, elastic: Elastic
-) -> tuple[Model, dict[bool, FloatArray]]:
+    kinds: Sequence[Sequence[_Piece]], settings: WeakSettings, elastic: At
+) -> tuple[Model, At]:
     """Widths of friction, and coefficients of the first terms, by windows; loaded logs' apart.
 
-    Those of elastic joints are among the first where there are such coefficients.
+    Those of elastic joints are among the first where coefficients of such are known.
 
     Raises
     ------
@@ -194,13 +189,13 @@ def _start(
     model = settings.model
     firsts = FIRST_TERMS + (ELASTIC if elastic else ())
 
-    def solved(model: Model) -> tuple[float, dict[bool, FloatArray]]:
+    def solved(model: Model) -> tuple[float, At]:
         cost, at = 0.0, {}
-        for loaded, own in enumerate(kinds):
+        for loaded, own in zip((False, True), kinds, strict=True):
             # beside a delay, which looks like friction where joints turn back
             at_first = None
-            if bool(loaded) in elastic:
-                at_first = vector(model.names, elastic[bool(loaded)], otherwise=0.0)
+            if loaded in elastic:
+                at_first = vector(model.names, elastic[loaded], otherwise=0.0)
             beside_delay = replace(settings, model=model, estimate_delay=True)
             made = [weak.normal_equations(log, beside_delay, at_first, known) for log, known in own]
             normals = [normal for normal in made if normal is not None]
@@ -210,7 +205,8 @@ def _start(
                 rows = np.stack([normal.rows for normal in normals])
                 weights = row_weights(grams, np.append(-c, 1.0), rows)
                 cost -= float(np.sum(rows * np.log(weights)))
-                at[bool(loaded)] = c[:-1]
+                at[loaded] = dict(zip(model.names, c.tolist(), strict=False))
+                at[loaded][DELAYS[0]] = settings.shift.delay
         if not at:
             raise TooShortError(f"no {OF_A_WINDOW}")
         return cost, at
@@ -247,11 +243,20 @@ class _Search:
     """Forward from the fixed terms by the most evident one, then backward."""
 
     first: Products
-    candidates: tuple[str, ...]
+    offered: tuple[str, ...]
     fixed: tuple[str, ...]
     absent: Collection[str]
-    scale: float
     suspects: Collection[str]
+
+    @cached_property
+    def scale(self) -> float:
+        """Mean square of what all terms leave."""
+        return self.first.mean_square(self.first.columns(self.offered))
+
+    @cached_property
+    def candidates(self) -> tuple[str, ...]:
+        """Terms to choose from."""
+        return outside(self.offered, self.fixed)
 
     def evidence(self, term: str, beside: Sequence[str]) -> float:
         """What `term` explains of the squares, less what chance explains once in a level's logs."""
@@ -275,8 +280,7 @@ class _Search:
     def plausible(self, term: str, beside: Sequence[str]) -> bool:
         """Whether the coefficients of `term` beside those terms are plausible."""
         p, _, _ = self.first.solve(self.first.columns([*beside, term]))
-        c = self.first.coefficients(p)[False]
-        value = dict(zip(self.first.shared.log_names, c.tolist(), strict=True))
+        value = self.first.coefficients(p)[False]
         for name in set(EVERY_TERM[term].names).difference(self.absent).intersection(value):
             low, high = PARAMETERS[name].plausible
             if not low <= value[name] <= high:
@@ -330,14 +334,21 @@ class _Search:
                 return kept
             kept.remove(min(poor)[1])
 
-    def trial(self, term: str, kept: Sequence[str], asked: Sequence[str]) -> TermTrial:
-        """What became of a term, beside those that were kept."""
+    def into(self, chosen: Selection, kept: Sequence[str]) -> Selection:
+        """A selection with the terms that were kept, and what became of each."""
+        own = without_delay(kept)
+        trials = tuple(self._trial(term, kept) for term in self.offered)
+        model, delay = replace(chosen.model, terms=own), len(own) < len(kept)
+        return replace(chosen, model=model, delay=delay, trials=trials)
+
+    def _trial(self, term: str, kept: Sequence[str]) -> TermTrial:
         beside = [other for other in kept if other != term and EVERY_TERM[other].needs != term]
-        if term not in asked and not has_need(term, beside):
+        asked = term in self.fixed
+        if not asked and not has_need(term, beside):
             reason = f"left out: no meaning without {EVERY_TERM[term].needs}"
             return TermTrial(term, False, 0.0, reason)
         evidence = self.evidence(term, beside)
-        if term in asked:
+        if asked:
             reason = "asked for"
         elif term in kept and evidence > 0:
             reason = "kept: evident in the likelihood"
@@ -351,7 +362,7 @@ class _Search:
             reason = "left out: its value would contradict physics"
         else:
             reason = "left out: other terms explain the same"
-        return TermTrial(term, term in kept or term in asked, evidence, reason)
+        return TermTrial(term, asked or term in kept, evidence, reason)
 
 
 def select(
@@ -395,19 +406,10 @@ def revised(
     fixed = tuple(kept)
     if chosen.delay and chosen.undetermined is not None:
         fixed += DELAYS
-    tried = [trial.term for trial in chosen.trials]
-    scale = products.mean_square(products.columns(tried))
+    tried = tuple(trial.term for trial in chosen.trials)
     # a rotor that the first pass did not suspect is none for being hardly significant now
-    suspects = chosen.model.terms
-    search = _Search(products, outside(tried, fixed), fixed, absent, scale, suspects)
-    terms = search.run()
-    own = without_delay(terms)
-    return replace(
-        chosen,
-        model=replace(chosen.model, terms=own),
-        delay=len(own) < len(terms),
-        trials=tuple(search.trial(term, terms, fixed) for term in tried),
-    )
+    search = _Search(products, tried, fixed, absent, chosen.model.terms)
+    return search.into(chosen, search.run())
 
 
 def _selected(
@@ -416,47 +418,38 @@ def _selected(
     candidates: Sequence[str],
     kept: Sequence[str],
     absent: Collection[str],
-    elastic: Elastic,
-) -> tuple[Selection, Elastic]:
+    elastic: At,
+) -> tuple[Selection, At]:
     """The terms that `select` chooses, and the coefficients if elastic joints are among them."""
-    settings = problem.settings
-    shapes, start = _start(kinds, settings, elastic)
-    every = replace(shapes, terms=tuple(name for name, term in TERMS.items() if not term.lags))
-    shared = Shared(every, delay=True)
+    model, at = _start(kinds, problem.settings, elastic)
+    shapes = model
     unloaded, loaded = ([log for log, _ in own] for own in kinds)
     some = replace(problem, unloaded=unloaded, loaded=loaded)
-    logs = [log for log in opened(some, shared) if log.loaded in start]
-    at: dict[bool, FloatArray] = {}
-    for is_loaded, c in start.items():
-        at[is_loaded] = np.zeros(len(shared.log_names))
-        at[is_loaded][[shared.log_names.index(name) for name in shapes.names]] = c
-        at[is_loaded][-1] = settings.shift.delay
+    logs = [log for log in opened(some) if log.loaded in at]
     fixed = tuple(kept)
     everything = tuple(dict.fromkeys(tuple(candidates) + fixed))
-    base = settings.shift.delay
+    base = problem.settings.shift.delay
     # Read from the torque, the load of joints would carry the torque's noise into its column, and
     # where angles are precise every joint would look elastic: the motion tells whether one is.
     for log in logs:
         log.by_motion = not elastic
-    first = Products(logs, shared, at, base)
+    first = Products(logs, model, at, base)
     soft = within(candidates, ELASTIC)
     if soft and not elastic:
-        scale = first.mean_square(first.columns(everything))
-        search = _Search(first, everything, fixed, absent, scale, candidates)
+        search = _Search(first, everything, fixed, absent, candidates)
         if search.evidence(soft[0], outside(everything, soft)) > 0:
             for log in logs:
                 log.by_motion = False
-            first = Products(logs, shared, at, base)
+            first = Products(logs, model, at, base)
     before: list[str] | None = None
     for left in reversed(range(_ROUNDS)):
-        offered = first.columns(everything)
-        refuted = misfit(logs, first.levels(logs, offered)) < level("REFUTED")
-        scale = first.mean_square(offered)
-        search = _Search(first, outside(candidates, fixed), fixed, absent, scale, candidates)
+        left_by_all = first.levels(logs, first.columns(everything))
+        refuted = misfit(logs, left_by_all) < level("REFUTED")
+        search = _Search(first, everything, fixed, absent, candidates)
         terms = search.run()
         after = first.coefficients(first.solve(first.columns(terms))[0])
         # a delay of samples that explains most is far from linear in its column
-        late = (after[False][-1] - at[logs[0].loaded][-1]) / first.dt
+        late = (after[False][DELAYS[0]] - at[logs[0].loaded][DELAYS[0]]) / first.dt
         far = abs(late) > 1 and terms[len(fixed) : len(fixed) + 1] == [*DELAYS]
         linear = all(EVERY_TERM[term].linear and not EVERY_TERM[term].timing for term in terms)
         # joints that give much are far from linear in what they give
@@ -464,49 +457,31 @@ def _selected(
         if (refuted and not far) or linear or terms == before:
             break
         at, before = after, terms
-        first = Products(logs, shared, at, base)
+        first = Products(logs, model, at, base)
         if left and far and late < -1:  # what is found has another round
-            other = _lagging(logs, shared, at, base)
+            (lag,) = EVERY_TERM[_LAG[0]].names
+            early = {
+                kind: {**c, lag: base - c[DELAYS[0]], DELAYS[0]: base} for kind, c in at.items()
+            }
+            lagging = replace(model, terms=model.terms + _LAG)
+            other = Products(logs, lagging, early, base)
             others = outside(terms, DELAYS)
             plain, column = first.columns(terms), other.columns([*others, *_LAG])
             scale = other.mean_square(column)
             less = (first.solve(plain)[1] - other.solve(column)[1]) / scale
             # the noise of a torque whose low-pass is undone is larger
             if less + first.determinant - other.determinant > 2 * SURE:
-                first, shared = other, other.shared
+                first, model = other, lagging
                 at = first.coefficients(first.solve(column)[0])
                 candidates = outside(candidates, DELAYS) + _LAG
                 everything = tuple(dict.fromkeys((*candidates, *fixed)))
     lateness = first.lateness(terms)
     if refuted:  # of what a model that does not hold leaves, no part is the delay's
         lateness = replace(lateness, std=np.inf)
-    own = without_delay(terms)
-    chosen = Selection(
-        replace(shapes, terms=own),
-        len(own) < len(terms),
-        shapes=shapes,
-        refuted=refuted,
-        late=lateness,
-    )
-    found = {}
-    if not set(ELASTIC).isdisjoint(terms):
-        names = first.shared.log_names
-        found = {kind: dict(zip(names, c.tolist(), strict=True)) for kind, c in after.items()}
-    if not candidates:
-        return chosen, found
-    trials = tuple(search.trial(term, terms, kept) for term in everything)
-    return replace(chosen, chosen_by="logs", trials=trials), found
-
-
-def _lagging(
-    logs: Sequence[LogEvidence], shared: Shared, at: Mapping[bool, FloatArray], base: float
-) -> Products:
-    """The first pass with a lag of the torque in place of the delay at `at`, which is negative."""
-    model = replace(shared.model, terms=shared.model.terms + _LAG)
-    lagging = replace(shared, model=model)
-    place = lagging.log_names.index(EVERY_TERM[_LAG[0]].names[0])
-    shifted = {}
-    for loaded, c in at.items():
-        shifted[loaded] = np.insert(c, place, base - c[-1])
-        shifted[loaded][-1] = base
-    return Products(logs, lagging, shifted, base)
+    chosen = Selection(shapes, False, shapes=shapes, refuted=refuted, late=lateness)
+    chosen = search.into(chosen, terms)
+    if candidates:
+        chosen = replace(chosen, chosen_by="logs")
+    else:
+        chosen = replace(chosen, trials=())
+    return chosen, {} if set(ELASTIC).isdisjoint(terms) else after
