@@ -168,7 +168,7 @@ def _other_units(text: str, reading: Reading) -> Iterator[tuple[str, object]]:
     A unit behind a number is that of a quantity, ``30 deg``. One that is a word of English too
     counts in brackets, or behind a word such as ``in``.
     """
-    letters = text.replace(",", " ").split()
+    letters, spoken = text.replace(",", " ").split(), set(re.findall(r"\w+", text.lower()))
     for before, word, behind in zip(["", *letters], letters, [*letters[1:], ""], strict=False):
         bare = word.strip("[](){};.\"'*")
         sure = before.lower() in _BEFORE_UNIT or before[-1:] in tuple(":=") or word[:1] in "[("
@@ -181,23 +181,19 @@ def _other_units(text: str, reading: Reading) -> Iterator[tuple[str, object]]:
         if unit in TORQUE or unit in CURRENT:
             quantity = "tau"
         elif unit in NANOSECONDS:
-            timed = not _TIME_WORDS.isdisjoint(re.findall(r"\w+", text.lower()))
+            timed = not _TIME_WORDS.isdisjoint(spoken)
             if timed and reading.clock == "column" and unit != (reading.time_unit or "s"):
                 yield "time_unit", unit
             continue
         elif unit is None:
             if not (sure and is_foreign(bare) and bare not in _COMMON):
                 continue
-            quantity = next((one for one in ("theta", "tau") if _names(one, text)), "")
+            named = (one for one in ("theta", "tau") if not spoken.isdisjoint(STEMS[one]))
+            quantity = next(named, "nothing")
         for name, channel in reading.channels.items():
             own = channel.factor and channel.told not in ("flag", "profile")
-            if quantity and name.startswith(quantity) and own and channel.unit != unit:
+            if name.startswith(quantity) and own and channel.unit != unit:
                 yield f"{name}.unit", unit
-
-
-def _names(quantity: str, text: str) -> bool:
-    """Whether a text has a word for a quantity."""
-    return not set(STEMS[quantity]).isdisjoint(re.findall(r"\w+", text.lower()))
 
 
 def several(name: str, values: Iterable[object]) -> Notice:

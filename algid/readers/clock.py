@@ -79,26 +79,19 @@ def in_order(
             raise LogError("time starts again, and its runs span over 292 years")
         yield SampleTable(table.stamp_ns + shift_ns, table.columns) if shift_ns else table
 
-    def in_time(table: SampleTable) -> SampleTable:
-        """The table in the order of time; what that mends is counted."""
-        nonlocal counts
-        ordered, added = _sorted(table)
-        counts += added
-        return ordered
-
     for rows in tables:
         if not len(rows):
             continue
         rising = bool(np.all(rows.stamp_ns[1:] > rows.stamp_ns[:-1]))
         if held is not None and rising and np.all(held.stamp_ns < rows.stamp_ns[0]):
-            yield from moved(in_time(held))
+            yield from moved(_sorted(held, counts))
         elif held is not None:
             rows, rising = stack([held, rows]), False
         if rising:
             held = rows
             continue
         while (start := _restart(rows)) is not None:
-            ordered = in_time(rows.part(0, start))
+            ordered = _sorted(rows.part(0, start), counts)
             last_ns, first_ns = int(ordered.stamp_ns[-1]), int(rows.stamp_ns[start])
             if not runs:
                 raise LogError(_backwards(last_ns, first_ns))
@@ -110,7 +103,7 @@ def in_order(
         certain = int(np.flatnonzero(~_late(rows.stamp_ns))[-1]) + 1
         if len(rows) - certain >= _SHORTEST:
             certain = len(rows)
-        ordered = in_time(rows.part(0, certain))
+        ordered = _sorted(rows.part(0, certain), counts)
         settled = max(0, len(ordered) - HORIZON)
         if settled:
             yield from moved(ordered.part(0, settled))
@@ -119,7 +112,7 @@ def in_order(
         last_one, known = Remedy({"segment": run}, "the last one"), counted(run, "run")
         raise LogError(f"there is no segment {segment}: its time makes {known}; {last_one}")
     if held is not None:
-        yield from moved(in_time(held))
+        yield from moved(_sorted(held, counts))
     late, repeated, lost = counts.tolist()
     if run > 1:
         said = "one is read behind another, and no window spans two"
@@ -176,10 +169,11 @@ def _restart(table: SampleTable) -> int | None:
     return None
 
 
-def _sorted(table: SampleTable) -> tuple[SampleTable, tuple[int, int, int]]:
-    """The table in time order, with counts of late samples, dropped repeats, differing repeats.
+def _sorted(table: SampleTable, counts: IntArray) -> SampleTable:
+    """The table in time order.
 
-    The last count is of dropped samples whose values differ from those of the sample kept.
+    What that mends is added to `counts`: late samples, dropped repeats, and of these the ones whose
+    values differ from those of the sample kept.
 
     Raises
     ------
@@ -188,7 +182,7 @@ def _sorted(table: SampleTable) -> tuple[SampleTable, tuple[int, int, int]]:
     """
     stamps = table.stamp_ns
     if np.all(stamps[1:] > stamps[:-1]):
-        return table, (0, 0, 0)
+        return table
     rows = len(table)
     back = np.flatnonzero(np.diff(stamps) < 0)
     order = np.argsort(stamps, kind="stable")
@@ -208,7 +202,8 @@ def _sorted(table: SampleTable) -> tuple[SampleTable, tuple[int, int, int]]:
     kept = order[fresh]
     gone, instead = order[~fresh], kept[np.cumsum(fresh)[~fresh] - 1]
     lost = gone.size - np.count_nonzero(_alike(table, gone, instead))
-    return table.take(kept), (int(np.count_nonzero(moved > 0)), repeated, int(lost))
+    counts += np.array([np.count_nonzero(moved > 0), repeated, lost])
+    return table.take(kept)
 
 
 def _backwards(last: int, first: int) -> str:

@@ -27,13 +27,13 @@ _WHOLE = re.compile(r"^[+-]?\d{1,19}$")
 _DATE = re.compile(r"^\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}")
 _ZONED = re.compile(r"(?:Z|[+-]\d{2}:?\d{2})$")
 
-
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _CODECS = {"csv.gz": "gzip", "csv.zst": "zstd"}
 
 
 def looks_like_text(head: bytes) -> bool:
     """Whether bytes are UTF-8 text, with tabs and line ends as only controls, or UTF-16."""
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+    if head.startswith(_UTF16):
         return True
     if any(byte < 32 and byte not in b"\t\n\r\f" for byte in set(head)):
         return False
@@ -119,7 +119,11 @@ def detect(head: bytes, names: Sequence[str] | None = None) -> Dialect:
     """
     import pyarrow as pa
 
-    lines = _lines(head)
+    if head.startswith(_UTF16):
+        raise LogError("the text is UTF-16; save it as UTF-8")
+    lines = re.split("\r\n|\n", head.decode("utf-8-sig", errors="replace"))
+    if len(head) >= LIMITS.head_bytes:
+        lines.pop()  # it may break off
     signs = (sign for sign in COMMENTS if any(line.startswith(sign) for line in lines))
     comment = next(signs, None)
     data = []
@@ -232,14 +236,6 @@ def split(line: str, separator: str) -> list[str]:
     else:
         return [cell.strip() for cell in line.split(separator)]
     return [cell.strip().strip('"').strip() for cell in cells]
-
-
-def _lines(head: bytes) -> list[str]:
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise LogError("the text is UTF-16; save it as UTF-8")
-    text = head.decode("utf-8-sig", errors="replace")
-    lines = re.split("\r\n|\n", text)
-    return lines[:-1] if len(head) >= LIMITS.head_bytes else lines  # the last one may break off
 
 
 def _separator(header: str, rows: list[str]) -> str:
