@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.model import K1, K2, K3, K4, K5, K6
 from algid.signals.differences import integral
-from algid.signals.segments import Segment, pieces_of
+from algid.signals.segments import Segment, pieces
 
 
 class IntegralColumns(NamedTuple):
@@ -310,7 +310,7 @@ def series_of(source: Iterable[Segment], window: float, stage: Stage) -> Iterato
         What is left over at the end of a segment is a window too, down to eight samples.
     stage : `stage1`, or `stage2` with what it knows
     """
-    for piece in pieces_of(source, window, least=8):
+    for piece in pieces(source, lambda dt: max(8, round(window / dt))):
         if len(piece) >= 8 and piece.omega is not None:  # what is shorter cannot be integrated
             values = stage(piece.theta, piece.omega, piece.tau, piece.dt)
             yield PaperSeries(t=piece.t, values=values, settled=round(SETTLED / piece.dt))

@@ -34,7 +34,7 @@ from algid.estimators.fit import Fit
 from algid.estimators.problem import Source
 from algid.model import F1, F2, Model, Motion, advanced, damping, inertia, regressor
 from algid.signals.filters import butterworth, correlate, smoother
-from algid.signals.segments import Segment, pieces_of
+from algid.signals.segments import Segment, pieces
 from algid.signals.shift import AT_ONCE, TorqueShift
 
 _PIECE_SECONDS = 60.0
@@ -176,7 +176,7 @@ def scored_torque(
 
     A piece that is too short to be scored is left out. See the module's table.
     """
-    for piece in pieces_of(segments, _PIECE_SECONDS):
+    for piece in pieces(segments, lambda dt: round(_PIECE_SECONDS / dt)):
         signals, dt, first = _decimated(piece)
         edge = round(DROPPED / dt)
         if signals.shape[1] <= max(2 * edge + 2, 6 * (ORDER + 1)):
@@ -309,7 +309,7 @@ def rollouts(
     step = time_step(model, c)
     spacing = max(_CLOSEST, duration / _STARTS)
     made = []
-    for piece in pieces_of(segments, _PIECE_SECONDS):
+    for piece in pieces(segments, lambda dt: round(_PIECE_SECONDS / dt)):
         starts = _starts(model, c, piece, spacing, step, shift)
         if starts is not None:
             made.append(starts)

@@ -245,9 +245,8 @@ def _low_passed_slope(tau: FloatArray, dt: float, lag: float) -> FloatArray:
     decay = np.exp(-dt / lag)
     mean = (1 - decay) * lag / dt
     numerator, denominator = np.array([1 - mean, mean - decay]), np.array([1.0, -decay])
-    start = tau[:, :1]
-    logged = [recursion(numerator, denominator, row, np.zeros(1))[0] for row in tau - start]
-    return (tau - start - np.stack(logged)) / lag
+    moved = tau - tau[:, :1]
+    return (moved - recursion(numerator, denominator, moved, np.zeros((2, 1)))[0]) / lag
 
 
 def along_stencil(P: FloatArray, weights: FloatArray) -> FloatArray:

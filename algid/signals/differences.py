@@ -24,6 +24,7 @@ from math import factorial, floor
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.signals.filters import reflected
 
 POINTS = 9
 _HALF = POINTS // 2
@@ -86,11 +87,7 @@ class Stencil:
     def moving(self, tau: FloatArray) -> FloatArray:
         """Torque (..., N) that moves the arm, of the logged one; the ends go on by reflection."""
         reach = self.taps.size // 2
-        if not reach:
-            return tau
-        before = 2 * tau[..., :1] - tau[..., reach:0:-1]
-        after = 2 * tau[..., -1:] - tau[..., -2 : -reach - 2 : -1]
-        return weighted(np.concatenate([before, tau, after], axis=-1), self.taps)
+        return weighted(reflected(tau, reach), self.taps) if reach else tau
 
     def torques(self, length: int) -> slice:
         """Torque samples among `length` whose stencil lies within the `length` angles."""

@@ -122,45 +122,36 @@ def butterworth(x: FloatArray, dt: float, cutoff: float) -> FloatArray:
     y = reflected(x, reach)
     for _ in range(2):  # there, and back again
         start = y[:, :1].copy()
-        y = _passed(numerator, denominator, y - start) + start
+        y = recursion(numerator, denominator, y - start, np.zeros((len(y), 3)))[0] + start
         y = y[:, ::-1]
     return np.ascontiguousarray(y[:, reach : reach + x.shape[1]])
 
 
-def _passed(numerator: FloatArray, denominator: FloatArray, x: FloatArray) -> FloatArray:
-    """Signals x (m, n) after `recursion`, each from rest, in one substitution."""
-    driven = np.empty(x.shape)
-    for own, signal in zip(driven, x, strict=True):
-        own[:] = np.convolve(signal, numerator)[: signal.size]
-    # of an upper band transposed, which LAPACK solves by products of rows: a third faster
-    band = np.empty((x.shape[1], denominator.size))
-    band[:] = denominator[::-1]
-    y, _ = lapack.dtbtrs(band.T, driven.T, uplo="U", trans="T", diag="U", overwrite_b=True)
-    return np.asarray(y.T)
-
-
 def reflected(x: FloatArray, reach: int) -> FloatArray:
-    """Signals (m, N + 2 reach), continued by point reflection about first and last samples."""
-    before = 2 * x[:, :1] - x[:, reach:0:-1]
-    after = 2 * x[:, -1:] - x[:, -2 : -reach - 2 : -1]
-    return np.concatenate([before, x, after], axis=1)
+    """Signals (..., N + 2 reach), continued by point reflection about first and last samples."""
+    before = 2 * x[..., :1] - x[..., reach:0:-1]
+    after = 2 * x[..., -1:] - x[..., -2 : -reach - 2 : -1]
+    return np.concatenate([before, x, after], axis=-1)
 
 
 def recursion(
     numerator: FloatArray, denominator: FloatArray, x: FloatArray, state: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Signal x (n,) after the filter Σ b_k z^-k / Σ a_k z^-k, and the state after it.
+    """Signals x (m, n) after the filter Σ b_k z^-k / Σ a_k z^-k, and the states after it.
 
-    b and a are (m + 1,), and a_0 = 1.
+    b and a are (order + 1,), and a_0 = 1.
 
-    The recursion Σ a_k y[i - k] = Σ b_k x[i - k] is one triangular banded system. `state` (m,) is
-    what the samples before add to its right side; zeros are a filter at rest.
+    The recursion Σ a_k y[i - k] = Σ b_k x[i - k] is one triangular banded system. `state` (m,
+    order) is what the samples before add to its right side; zeros are a filter at rest.
     (`scipy.signal.lfilter` does the same; its package takes a second to import, which a short log
     does not take to identify.)
     """
-    driven = np.convolve(numerator, x)
-    driven[: state.size] += state
-    band = np.tile(denominator, (x.size, 1)).T
-    y, _ = lapack.dtbtrs(band, driven[: x.size], uplo="L", diag="U")
-    settled = np.convolve(denominator, y[-state.size :])
-    return y, driven[x.size :] - settled[-state.size :]
+    order, n = state.shape[1], x.shape[1]
+    driven = np.stack([np.convolve(signal, numerator) for signal in x])
+    driven[:, :order] += state
+    # of an upper band transposed, which LAPACK solves by products of rows: a third faster
+    band = np.empty((n, order + 1))
+    band[:] = denominator[::-1]
+    y, _ = lapack.dtbtrs(band.T, driven[:, :n].T, uplo="U", trans="T", diag="U")
+    settled = np.stack([np.convolve(denominator, one[-order:])[-order:] for one in y.T])
+    return y.T, driven[:, n:] - settled

@@ -92,9 +92,10 @@ class LuenbergerObserver:
             self._rest = theta[:, 0].copy()
         omega = np.empty_like(theta)
         for joint, (numerator, denominator) in enumerate(self._filters):
-            moved = theta[joint] - self._rest[joint]
-            omega[joint], self._states[joint] = recursion(
-                numerator, denominator, moved, self._states[joint]
+            own = slice(joint, joint + 1)
+            moved = theta[own] - self._rest[own, None]
+            omega[own], self._states[own] = recursion(
+                numerator, denominator, moved, self._states[own]
             )
         return omega
 

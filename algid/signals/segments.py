@@ -11,16 +11,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
+from typing import Any
 
 import numpy as np
 
 from algid.arm import FloatArray, keep_arrays
 from algid.base.criteria import CUT
-from algid.log import IntArray, Log, join, joined, usual_period
-from algid.signals.spacing import spaced
+from algid.log import SIGNALS, IntArray, Log, join, joined, usual_period
+from algid.signals.spacing import signals_of, spaced
 
 PERIOD_SAMPLES = 4096  # the first samples, from which the period is taken
-_BRIDGE = 8  # samples of a block that are joined to those held back from the one before
 EVEN = 1e-3  # periods: stamps this close to the time base are taken as lying on it
 
 
@@ -63,20 +63,15 @@ class Segment:
 
     def part(self, first: int, last: int) -> Segment:
         """Samples `first` to `last` - 1 as views; it continues the part before it."""
-        omega, reference = self.omega, self.reference
-        if omega is not None:
-            omega = omega[:, first:last]
-        if reference is not None:
-            reference = reference[:, first:last]
         return replace(
-            self,
+            self.of_signals(lambda signal: signal[:, first:last]),
             start=self.start + first * self.dt,
-            theta=self.theta[:, first:last],
-            tau=self.tau[:, first:last],
-            omega=omega,
-            reference=reference,
             continues=self.continues or first > 0,
         )
+
+    def of_signals(self, change: Callable[[FloatArray], FloatArray]) -> Segment:
+        """The same with each signal that it has changed."""
+        return replace(self, **signals_of(self, change))
 
 
 def segments(blocks: Iterable[Log]) -> Iterator[Segment]:
@@ -97,10 +92,7 @@ def segments(blocks: Iterable[Log]) -> Iterator[Segment]:
     near = steps[np.abs(steps - 1e9 * dt) <= 0.5e9 * dt]
     if 2 * near.size > steps.size:
         dt = float(near.mean()) * 1e-9
-    sampler = _Sampler(int(head.stamp_ns[0]), dt)
-    for block in spaced(chain([head], source), dt):
-        yield from sampler.push(block)
-    yield from sampler.finish()
+    yield from _resampled(spaced(chain([head], source), dt), int(head.stamp_ns[0]), dt)
 
 
 def stretches(blocks: Iterable[Log]) -> list[Segment]:
@@ -124,88 +116,46 @@ def _first_stamps(blocks: Iterable[Log]) -> IntArray:
     return np.concatenate(stamps)[:PERIOD_SAMPLES]
 
 
-class _Sampler:
-    """Resample blocks on the time base; the last samples wait until their successors are known."""
+def _resampled(blocks: Iterable[Log], origin_ns: int, dt: float) -> Iterator[Segment]:
+    """Blocks on the time base; the last samples wait until their successors are known."""
+    held: list[Log] = []
+    anchor, emitted = 0.0, -1  # time of a stretch's first sample, and how many were given out
+    for block in chain(blocks, [None]):
+        log = join(held if block is None else [*held, block])
+        t = (log.stamp_ns - origin_ns) * 1e-9
+        gaps = np.flatnonzero(np.diff(log.stamp_ns) * 1e-9 > CUT * dt) + 1
+        edges = [0, *gaps.tolist(), len(log)]
+        for first, last in pairwise(edges):
+            if first or emitted < 0:
+                anchor, emitted = float(t[first]), 0
+            # of a stretch that goes on the last sample but one is the last that is determined
+            ended = block is None or last < len(log)
+            reach = t[last - 1] + EVEN * dt if ended else t[max(first, last - 2)] - EVEN * dt
+            count = int(np.floor((reach - anchor) / dt)) + 1 - emitted
+            if count > 0 and last - first >= 4:
+                grid = anchor + dt * np.arange(emitted, emitted + count)
+                yield replace(
+                    _at(log.part(first, last), t[first:last], grid, dt), continues=emitted > 0
+                )
+                emitted += count
+        held = [log.part(max(edges[-2], len(log) - 4), len(log))]
 
-    def __init__(self, origin_ns: int, dt: float) -> None:
-        self._origin_ns = origin_ns
-        self._dt = dt
-        self._pending: Log | None = None
-        self._anchor = 0.0  # time of the stretch's first sample
-        self._emitted = 0  # grid points of the stretch that have been given out
 
-    def push(self, block: Log) -> Iterator[Segment]:
-        if self._pending is None:
-            self._anchor = float(self._time(block.stamp_ns[0]))
-            yield from self._settle(block)
-            return
-        yield from self._settle(join([self._pending, block.part(0, _BRIDGE)]))
-        if len(block) > _BRIDGE:  # what is held back now is the block's own: no copy
-            yield from self._settle(block.part(_BRIDGE - len(self._pending), len(block)))
+def _at(log: Log, t: FloatArray, grid: FloatArray, dt: float) -> Segment:
+    """A log with samples at `t` at the instants of `grid`."""
+    first = int(np.searchsorted(t, grid[0] - 0.5 * dt))
+    own = slice(first, first + grid.size)
+    if _alike(t[own], grid, EVEN * dt):
+        return Segment(float(grid[0]), dt, **signals_of(log, lambda signal: signal[:, own]))
+    weights = _cubic(t, grid)
 
-    def _settle(self, held: Log) -> Iterator[Segment]:
-        gaps = []
-        steps = np.diff(held.stamp_ns)
-        if steps.max(initial=0) * 1e-9 > CUT * self._dt:
-            gaps = (np.flatnonzero(steps * 1e-9 > CUT * self._dt) + 1).tolist()
-        edges = [0, *gaps, len(held)]
-        for first, last in pairwise(edges[:-1]):
-            yield from self._stretch(held.part(first, last), ends=True)
-            self._anchor, self._emitted = float(self._time(held.stamp_ns[last])), 0
-        self._pending = held.part(edges[-2], edges[-1])
-        yield from self._stretch(self._pending, ends=False)
-        self._pending = self._pending.part(max(0, len(self._pending) - 4), len(self._pending))
+    def between(signal: FloatArray) -> FloatArray:
+        values = np.zeros((2, grid.size))
+        for place, weight in weights:
+            values += weight * signal[:, place]
+        return values
 
-    def finish(self) -> Iterator[Segment]:
-        if self._pending is not None:
-            yield from self._stretch(self._pending, ends=True)
-
-    def _time(self, stamp_ns: IntArray) -> FloatArray:
-        return (stamp_ns - self._origin_ns) * 1e-9
-
-    def _stretch(self, log: Log, *, ends: bool) -> Iterator[Segment]:
-        """Grid points that `log` determines: up to its last sample but one, or all if `ends`."""
-        t = self._time(log.stamp_ns)
-        if ends:
-            reach = t[-1] + EVEN * self._dt
-        else:
-            reach = t[max(0, t.size - 2)] - EVEN * self._dt
-        count = int(np.floor((reach - self._anchor) / self._dt)) + 1 - self._emitted
-        if count <= 0 or t.size < 4:
-            return
-        grid = np.arange(self._emitted, self._emitted + count, dtype=np.float64)
-        grid *= self._dt
-        grid += self._anchor
-        first = int(np.searchsorted(t, grid[0] - 0.5 * self._dt))
-        own = slice(first, first + count)
-        even = _alike(t[own], grid, EVEN * self._dt)
-        weights: list[tuple[IntArray, FloatArray]] = []
-        if not even:
-            weights = _cubic(t, grid)
-
-        def take(signal: FloatArray) -> FloatArray:
-            if even:
-                return signal[:, own]
-            values = np.zeros((2, count))
-            for place, weight in weights:
-                values += weight * signal[:, place]
-            return values
-
-        omega = reference = None
-        if log.omega is not None:
-            omega = take(log.omega)
-        if log.reference is not None:
-            reference = take(log.reference)
-        yield Segment(
-            start=float(grid[0]),
-            dt=self._dt,
-            theta=take(log.theta),
-            tau=take(log.tau),
-            omega=omega,
-            reference=reference,
-            continues=self._emitted > 0,
-        )
-        self._emitted += count
+    return Segment(float(grid[0]), dt, **signals_of(log, between))
 
 
 def _alike(t: FloatArray, grid: FloatArray, reach: float) -> bool:
@@ -230,27 +180,41 @@ def _cubic(t: FloatArray, grid: FloatArray) -> list[tuple[IntArray, FloatArray]]
     return weights
 
 
-def pieces(source: Iterable[Segment], rows: int, shortest: int = 1) -> Iterator[Segment]:
-    """Cut each stretch into pieces of `rows` samples, less those below `shortest`: see `Cutter`."""
-    cutter = Cutter(rows)
-    for segment in source:
-        for piece in cutter.push(segment):
+def pieces(
+    source: Iterable[Segment], rows: int | Callable[[float], int], shortest: int = 1
+) -> Iterator[Segment]:
+    """Cut each stretch into pieces of `rows` samples, less those below `shortest`.
+
+    A rest shorter than half a piece joins the last one. The pieces do not depend on how the
+    stretches came in. Their length is below 1.5 `rows`; a stretch shorter than half a piece is a
+    piece of its own.
+
+    Parameters
+    ----------
+    source : iterable of `Segment`
+    rows : int or callable
+        Samples, or what gives them from the period in s.
+    shortest : int
+    """
+    held: Segment | None = None
+    size = 0
+    for segment in chain(source, [None]):
+        done: list[Segment] = []
+        if held is not None and (segment is None or not segment.continues):
+            if len(held) >= size + (size + 1) // 2:
+                done.append(held.part(0, size))
+                held = held.part(size, len(held))
+            done.append(held)
+            held = None
+        if segment is not None:
+            held = segment if held is None else append(held, segment)
+            size = rows if isinstance(rows, int) else rows(held.dt)
+            while len(held) >= 2 * size:
+                done.append(held.part(0, size))
+                held = held.part(size, len(held))
+        for piece in done:
             if len(piece) >= shortest:
                 yield piece
-    for piece in cutter.finish():
-        if len(piece) >= shortest:
-            yield piece
-
-
-def pieces_of(source: Iterable[Segment], seconds: float, least: int = 1) -> Iterator[Segment]:
-    """Cut each stretch of a log into pieces of `seconds` and `least` samples: see `Cutter`."""
-    cutter: Cutter | None = None
-    for segment in source:
-        if cutter is None:
-            cutter = Cutter(max(least, round(seconds / segment.dt)))
-        yield from cutter.push(segment)
-    if cutter is not None:
-        yield from cutter.finish()
 
 
 def spread_pieces(usable: Iterable[Segment], count: int, rows: int) -> tuple[list[Segment], bool]:
@@ -276,73 +240,11 @@ def spread_pieces(usable: Iterable[Segment], count: int, rows: int) -> tuple[lis
     for index, piece in enumerate(usable):
         if index % stride:
             continue
-        copy = _copied(piece)
+        copy = piece.of_signals(np.copy)
         kept.append(replace(copy, continues=piece.continues and stride == 1))
         if len(kept) > 2 * count and sum(map(len, kept)) > 2 * count * rows:
             kept, stride = [replace(other, continues=False) for other in kept[::2]], 2 * stride
     return kept, stride == 1
-
-
-def _copied(piece: Segment) -> Segment:
-    """A piece with arrays of its own."""
-    omega, reference = piece.omega, piece.reference
-    if omega is not None:
-        omega = omega.copy()
-    if reference is not None:
-        reference = reference.copy()
-    return replace(
-        piece, theta=piece.theta.copy(), tau=piece.tau.copy(), omega=omega, reference=reference
-    )
-
-
-class Cutter:
-    """Cuts each stretch into pieces of `rows` samples.
-
-    A rest shorter than half a piece joins the last one.
-
-    The pieces do not depend on how the stretches came in. Their length is below 1.5 `rows`; a
-    stretch shorter than half a piece is a piece of its own. Pieces are views wherever they lie
-    within one segment.
-    """
-
-    def __init__(self, rows: int) -> None:
-        self._rows = rows
-        self._held: Segment | None = None  # fewer than two pieces
-
-    def push(self, segment: Segment) -> Iterator[Segment]:
-        """Take in a segment; give out the pieces that are settled."""
-        if self._held is not None and not segment.continues:
-            yield from self.finish()
-        if self._held is None:
-            yield from self._pieces_of(segment)
-            return
-        held = self._held
-        while len(held) + len(segment) >= 2 * self._rows:
-            if len(held) < self._rows:
-                missing = self._rows - len(held)
-                yield append(held, segment.part(0, missing))
-                yield from self._pieces_of(segment.part(missing, len(segment)))
-                return
-            yield held.part(0, self._rows)
-            held = held.part(self._rows, len(held))
-        self._held = append(held, segment)
-
-    def _pieces_of(self, segment: Segment) -> Iterator[Segment]:
-        """Whole pieces of a segment that follows no other; holds what is left."""
-        while len(segment) >= 2 * self._rows:
-            yield segment.part(0, self._rows)
-            segment = segment.part(self._rows, len(segment))
-        self._held = segment
-
-    def finish(self) -> Iterator[Segment]:
-        """Give out what is left of a stretch at its end."""
-        rest, self._held = self._held, None
-        if rest is None:
-            return
-        if len(rest) >= self._rows + (self._rows + 1) // 2:
-            yield rest.part(0, self._rows)
-            rest = rest.part(self._rows, len(rest))
-        yield rest
 
 
 def settled(
@@ -373,10 +275,7 @@ def settled(
 
 def append(first: Segment, second: Segment) -> Segment:
     """One segment out of two, the second of which continues the first."""
-    return replace(
-        first,
-        theta=np.concatenate([first.theta, second.theta], axis=1),
-        tau=np.concatenate([first.tau, second.tau], axis=1),
-        omega=joined([first.omega, second.omega]),
-        reference=joined([first.reference, second.reference]),
-    )
+    signals: dict[str, Any] = {}
+    for name in SIGNALS:
+        signals[name] = joined([getattr(first, name), getattr(second, name)])
+    return replace(first, **signals)

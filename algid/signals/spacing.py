@@ -17,15 +17,15 @@ size     samples of each cluster               (C,)
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.log import IntArray, Log, join
+from algid.log import SIGNALS, IntArray, Log, join
 
-BRIDGE = 16  # samples
 NEAR = 0.3
 """Periods: nodes of a cubic this far apart still carry noise of at most twice one sample's."""
 
@@ -33,54 +33,30 @@ NEAR = 0.3
 def spaced(blocks: Iterable[Log], period: float) -> Iterator[Log]:
     """The log that comes in `blocks`, without samples nearer than `NEAR` of a `period` in s.
 
-    What comes out does not depend on how the blocks were cut. Blocks without clusters pass as they
-    are.
+    None of the `blocks`, one at least, is empty. What comes out does not depend on how they were
+    cut.
     """
-    near_ns = NEAR * period * 1e9
-    held: Log | None = None  # the last cluster, which may go on in the next block
+    held: list[Log] = []  # the last cluster, which may go on in the next block
     before: Log | None = None  # the sample before it
     for block in blocks:
-        if not len(block):
-            continue
-        far = np.diff(block.stamp_ns) >= near_ns
-        settled: list[Log] = []
-        first = 0
-        if held is not None:
-            if block.stamp_ns[0] - held.stamp_ns[-1] < near_ns:
-                if not far.any():
-                    held = join([held, block])
-                    continue
-                first = int(far.argmax()) + 1
-                held = join([held, block.part(0, first)])
-            settled.append(_settled(held, before, period))
-            before = held.part(len(held) - 1, len(held))
-        last = first
-        if far[first:].any():
-            last = len(block) - 1 - int(far[::-1].argmax())
-            own = block.part(first, last)
-            if not far[first : last - 1].all():
-                own = _settled(own, before, period)
-            settled.append(own)
-            before = block.part(last - 1, last)
-        yield from _bridged(settled)
-        held = block.part(last, len(block))
-    if held is not None:
-        yield _settled(held, before, period)
+        log = join([*held, block])
+        far = np.flatnonzero(np.diff(log.stamp_ns) >= NEAR * period * 1e9) + 1
+        last = int(far[-1]) if far.size else 0
+        if last:
+            yield _settled(log.part(0, last), before, period)
+            before = log.part(last - 1, last)
+        held = [log.part(last, len(log))]
+    yield _settled(join(held), before, period)
 
 
-def _bridged(settled: list[Log]) -> Iterator[Log]:
-    """Completed samples; a last cluster of a block joins the first `BRIDGE` samples of the next.
-
-    Whether samples lie on the grid is judged a block at a time, and a block of one sample lies on
-    it by chance.
-    """
-    if len(settled) < 2:
-        yield from settled
-        return
-    remnant, piece = settled
-    yield join([remnant, piece.part(0, BRIDGE)])
-    if len(piece) > BRIDGE:
-        yield piece.part(BRIDGE, len(piece))
+def signals_of(log: object, change: Callable[[FloatArray], FloatArray]) -> dict[str, Any]:
+    """By name each signal that a log has, changed."""
+    signals = {}
+    for name in SIGNALS:
+        signal = getattr(log, name)
+        if signal is not None:
+            signals[name] = change(signal)
+    return signals
 
 
 def near_stamps(stamp_ns: IntArray, period: float) -> int:
@@ -147,8 +123,5 @@ def _merged(log: Log, starts: IntArray) -> Log:
         # floor, since rounding to even would depend on where the block begins
         stamp_ns=origin_ns
         + np.floor(mean((log.stamp_ns - origin_ns).astype(np.float64)) + 0.5).astype(np.int64),
-        theta=mean(log.theta),
-        tau=mean(log.tau),
-        omega=None if log.omega is None else mean(log.omega),
-        reference=None if log.reference is None else mean(log.reference),
+        **signals_of(log, mean),
     )

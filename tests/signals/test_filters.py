@@ -26,7 +26,7 @@ def test_slow_sampling_keeps_what_the_kernel_promises(rate: float) -> None:
 @pytest.mark.parametrize("n", [1, 2, 3, 500])
 def test_a_recursion_is_scipys_and_leaves_its_state(n: int) -> None:
     rng = np.random.default_rng(4)
-    x, state = rng.normal(size=n), rng.normal(size=3)
+    x, state = rng.normal(size=(2, n)), rng.normal(size=(2, 3))
     numerator, denominator = (
         np.array([0.3, -0.1, 0.4, 0.2]),
         np.poly([0.9, 0.5 + 0.4j, 0.5 - 0.4j]).real,
