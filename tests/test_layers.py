@@ -69,7 +69,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "identification": room(
         "arm arrow criteria errors estimators files inspection log methods model names "
         "notices options physics profile progress readers report results runtime settings signals "
-        "significance table4 text units",
+        "significance table4 text",
         "numpy polars pyarrow",
     ),
     "batches": room(

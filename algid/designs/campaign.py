@@ -175,8 +175,6 @@ class Planned:
         The largest among arms drawn from the belief.
     usage : Usage
         Of the limits as they were given, by all arms of the belief.
-    interrupted : bool
-        Whether the search was broken off.
     """
 
     campaign: Campaign
@@ -187,7 +185,6 @@ class Planned:
     worst: FloatArray
     shares: FloatArray
     usage: Usage
-    interrupted: bool
 
     def __repr__(self) -> str:
         return f"Planned({', '.join(f'{name} ± {std:.2g}' for name, std in self.bounds.items())})"
@@ -254,14 +251,12 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Planned:
     ------
     SettingError
         If no motion keeps the limits, or the angles' noise at that rate hides every torque.
-    KeyboardInterrupt
-        If it is interrupted before there is a motion; later, the best so far is the plan.
     """
     rate = campaign.experiment.rate
     t = np.arange(round(campaign.duration * rate) + 1) / rate
     experiment, belief = campaign.experiment, campaign.belief
     try:
-        x, interrupted = optimise(campaign, rate, campaign.seed, progress)
+        x = optimise(campaign, rate, campaign.seed, progress)
         motion = campaign.family.motion(x, campaign.family.basis(t))
         slopes = Sensitivities(experiment.shared.model, motion, rate)
         # the error bars of its log
@@ -293,5 +288,4 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Planned:
         worst=np.sqrt(worst),
         shares=np.einsum("pi,bij,jp->pb", C, parts, C) / np.diag(C)[:, None],
         usage=usage(campaign.limits, slopes, campaign.loads, derivatives=False),
-        interrupted=interrupted,
     )

@@ -141,8 +141,8 @@ class Evaluation:
 
 def optimise(
     campaign: Campaign, rate: float, seed: int, progress: Progress | None = None
-) -> tuple[FloatArray, bool]:
-    """The best motion that the search finds, and whether it was broken off before its end.
+) -> FloatArray:
+    """The best motion that the search finds.
 
     Parameters
     ----------
@@ -152,17 +152,11 @@ def optimise(
     seed : int
     progress : callable
         Called with how many iterations of how many are done.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        If it is interrupted before there is a motion to keep.
     """
     from scipy.optimize import minimize
 
     total = STARTS * FIRST.iterations + KEPT * sum(stage.iterations for stage in LATER)
     done = 0
-    current: FloatArray | None = None
     judged: dict[float, FloatArray] = {}
 
     def score(x: FloatArray) -> float:
@@ -172,9 +166,8 @@ def optimise(
         judged.setdefault(found, x)
         return found
 
-    def step(x: FloatArray) -> None:
-        nonlocal done, current
-        current = x.copy()
+    def step(_: FloatArray) -> None:
+        nonlocal done
         done += 1
         if progress is not None:
             progress("searching", done, total)
@@ -217,24 +210,17 @@ def optimise(
         done = start + stage.iterations
         return ended.x if np.all(np.isfinite(ended.x)) else x
 
-    interrupted = False
-    try:
-        rng = np.random.default_rng(seed)
-        room = 0.5 * (1 + max(_EASY, campaign.excess(campaign.rest, FIRST.rate)))
-        ends = []
-        for _ in range(STARTS):
-            ends.append(run(kept(campaign, campaign.random(rng), FIRST.rate, room), FIRST))
-        for end in sorted(ends, key=score)[:KEPT]:
-            better = end
-            for stage in LATER:
-                better = run(better, stage)
-                score(better)
-    except KeyboardInterrupt:
-        if current is None:
-            raise
-        score(current)
-        interrupted = True
-    return judged[min(judged)], interrupted
+    rng = np.random.default_rng(seed)
+    room = 0.5 * (1 + max(_EASY, campaign.excess(campaign.rest, FIRST.rate)))
+    ends = []
+    for _ in range(STARTS):
+        ends.append(run(kept(campaign, campaign.random(rng), FIRST.rate, room), FIRST))
+    for end in sorted(ends, key=score)[:KEPT]:
+        better = end
+        for stage in LATER:
+            better = run(better, stage)
+            score(better)
+    return judged[min(judged)]
 
 
 def kept(campaign: Campaign, x: FloatArray, rate: float, most: float = 1.0) -> FloatArray:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,9 +26,6 @@ from algid.report.document import Document, Section, Table
 from algid.report.figures import shares_of_time
 from algid.report.plot import ArmDrawing, Panels
 from algid.report.render import page, write_texts
-
-if TYPE_CHECKING:
-    pass
 
 # a second, of the joint trajectory: its controller joins them by polynomials of fifth degree
 POINTS = 50.0
@@ -116,7 +113,6 @@ def design_json(design: Planned) -> str:
         "rate": experiment.rate,
         "runs": {"unloaded": experiment.runs[0], "loaded": experiment.runs[1]},
         "seed": campaign.seed,
-        "interrupted": design.interrupted,
         "noise": {name: float(level) for name, level in noise.items()},
         "gravity": experiment.shared.model.gravity,
         "parameters": _parameters(design),
@@ -270,8 +266,6 @@ def verdict(design: Planned) -> Verdict:
             Notice("NOT_REACHED", numbers={"case": "parameters"} | numbers, remedies=_WIDER)
         )
     reasons += design.campaign.doubts
-    if design.interrupted:
-        reasons.append(Notice("NOT_REACHED", numbers={"case": "stopped"}))
     relative = np.where(design.campaign.asked.wanted, design.relative, -np.inf)
     row, used = design.binding[0]
     return graded(

@@ -25,7 +25,7 @@ horizontal plane.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import Literal
@@ -36,7 +36,6 @@ from algid import results
 from algid.arm import FloatArray
 from algid.base.names import within
 from algid.base.significance import NORMAL, SURE, chance
-from algid.base.units import TORQUE
 from algid.estimators.combine import of_kind
 from algid.estimators.diagnostics import (
     FAR_BEYOND,
@@ -80,7 +79,7 @@ from algid.physics.effort import FRICTION
 from algid.results.verdict import wrong_length
 from algid.settings import Settings
 
-STEEL, AIR = 8000.0, 1.2  # kg/m³
+STEEL = 8000.0  # kg/m³
 LEAST_SURE = 10.0  # standard deviations that a length has to have
 MOST = 0.5  # R² below which most of a torque is not the model's
 
@@ -148,29 +147,6 @@ def _of_refuted(found: Fitted) -> Iterator[Notice]:
         yield Notice("HARDLY_DRIVEN", numbers={"case": "bounds", "bounds": far})
 
 
-def torque_unit(logs: Sequence[Recording]) -> float | None:
-    """N m of the one unit that all torques were read in.
-
-    None where they differ, or an offset in N m or a PD law's gains do not follow the unit.
-    """
-    units = set()
-    for log in logs:
-        reading = log.origin.reading
-        for joint in (1, 2):
-            channel = reading.channels.get(f"tau{joint}")
-            if joint == reading.passive:
-                continue
-            if channel is None:
-                units.add("N m")
-            elif channel.offset:
-                return None
-            else:
-                units.add(channel.unit)
-    if len(units) != 1:
-        return None
-    return TORQUE.get(units.pop())
-
-
 def _of_gravity(found: Fitted) -> Iterator[Notice]:
     """That the torque is said to be without gravity."""
     shared = found.fit.shared
@@ -203,26 +179,16 @@ def _of_phases(found: Fitted) -> Iterator[Notice]:
 
 
 def _of_mass(found: Fitted) -> Iterator[Notice]:
-    """Notice of an arm heavier than steel cubes of its links: m1 lc1 / l1 + m2 = k4 / (g l1).
-
-    A smaller unit of torque scales every constant alike, so that the fit shows what it would give.
-    """
-    fit, unit = found.fit, torque_unit(found.survey.logs)
-    by_constants = length_by_constants(fit)
+    """Notice of an arm heavier than steel cubes of its links: m1 lc1 / l1 + m2 = k4 / (g l1)."""
+    fit, by_constants = found.fit, length_by_constants(found.fit)
     if K4 not in fit.names or K4 in fit.absent or by_constants is None:
         return
     length, std = by_constants
-    if not LEAST_SURE * std < length:
-        return
-    mass = abs(float(fit.values[fit.names.index(K4)])) / (fit.shared.model.gravity * length)
-    if mass > STEEL * length**3:
-        remedies: tuple[Remedy, ...] = ()
-        if unit is not None and fit.prior is None and fit.converged and not broken_bounds(fit):
-            lighter = mass * TORQUE["mN m"] / unit
-            if AIR * length**3 <= lighter <= STEEL * length**3:
-                remedies = (Remedy({"torque_unit": "mN m"}, "where torques are in mN m"),)
-        numbers = {"mass": mass, "length": length}
-        yield Notice("OTHER_UNIT", numbers={"case": "heavy"} | numbers, remedies=remedies)
+    if LEAST_SURE * std < length:
+        mass = abs(float(fit.values[fit.names.index(K4)])) / (fit.shared.model.gravity * length)
+        if mass > STEEL * length**3:
+            numbers = {"case": "heavy", "mass": mass, "length": length}
+            yield Notice("OTHER_UNIT", numbers=numbers)
 
 
 def _of_gains(found: Fitted) -> Iterator[Notice]:

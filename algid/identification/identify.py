@@ -248,18 +248,23 @@ def _by_likelihood(
     from algid.identification.prior import statement_of, with_prior
 
     said = statement_of(settings)
+    # the terms that the logs choose, their fit, and what makes it doubtful
     first = _fitted(survey, settings, earlier)
     found = doubted(first)
+    # the effort that it shows, and the fit of that; of constants in doubt no weight is missed
     of_driver: list[Notice] = []
-    if found is first:  # of constants in doubt no weight is missed
+    if found is first:
         shown, of_driver = of_effort(found.fit, settings)
         if shown != settings:
             found = doubted(_fitted(survey, shown, earlier))
     found = by_free_lengths(found)
+    # what CAD or an earlier result says beside the logs
     if said is not None:
         found = replace(found, fit=with_prior(found.fit, said))
+    # the estimates, their statuses, and how well they predict
     survey.begin("prediction")
     result = outcome_of(found)
+    # gravity that is turned against θ1
     turned: Iterable[Notice] = ()
     log = survey.logs[0]
     reading = log.origin.reading
@@ -272,6 +277,7 @@ def _by_likelihood(
     result = result.model_copy(update={"notices": notices})
     if folder is None:
         return result
+    # what is drawn over time
     survey.begin("series")
     write_fit_series(folder, found, residual_of(found))
     # beside them the paper's series of the first log of each kind, and its payload route

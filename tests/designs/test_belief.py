@@ -7,8 +7,7 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.base.errors import SettingError
-from algid.base.significance import SURE
-from algid.designs.belief import UNKNOWN, Belief, Objective, objective_of
+from algid.designs.belief import Belief, Objective, objective_of
 from algid.estimators.parametrisation import Shared
 from algid.model import Model
 
@@ -18,18 +17,6 @@ ALL = np.ones(3, bool)
 
 def asked(size: FloatArray = SIZES, wanted: FloatArray | None = None) -> Objective:
     return Objective(size, ALL, ALL if wanted is None else wanted.astype(bool))
-
-
-def test_the_covariance_is_the_inverse_of_the_information_held_at_unknown_sizes() -> None:
-    S = np.diag([4e4, 25.0, 0.0])
-    C = asked().covariance(S)
-    held = 1 / (UNKNOWN * SIZES) ** 2
-    np.testing.assert_allclose(np.diag(C), 1 / (np.diag(S) + held), rtol=1e-12)
-    np.testing.assert_allclose(asked().relative(S)[2], UNKNOWN, rtol=1e-12)  # nothing is told of it
-    assert asked().largest(S) == pytest.approx(UNKNOWN)
-    assert asked(wanted=np.array([1, 1, 0])).largest(S) == pytest.approx(
-        np.sqrt(1 / 25.0), rel=1e-6
-    )
 
 
 def test_relative_bounds_of_correlated_parameters_are_those_of_cramer_and_rao() -> None:
@@ -75,21 +62,6 @@ def test_drawn_arms_scatter_as_believed(box: bool) -> None:
         assert np.all(np.abs(drawn - one.mean) <= np.abs(one.spread).sum(axis=1))
     np.testing.assert_array_equal(one.draws(5, 3), one.draws(5, 3))
     assert np.any(one.draws(5, 3) != one.draws(5, 4))
-
-
-@pytest.mark.parametrize("box", [True, False])
-def test_the_slope_of_the_largest_torque_is_that_of_differences(box: bool) -> None:
-    load, rng = belief(box).load(True), np.random.default_rng(4)
-    Y, D = rng.standard_normal((2, 2, 7, 6))
-    slope = load.largest(Y)[2]
-    h = 1e-6
-    more = (load.largest(Y + h * D)[1] - load.largest(Y - h * D)[1]) / (2 * h)
-    np.testing.assert_allclose(np.einsum("aqn,aqn->an", slope, D), more, rtol=1e-5, atol=1e-8)
-    torque, most, _ = load.largest(Y)
-    np.testing.assert_allclose(torque, np.einsum("aqn,q->an", Y, load.c), rtol=1e-12)
-    varied = np.einsum("aqn,qr->arn", Y, load.F)
-    norm = np.abs(varied).sum(axis=1) if box else SURE * np.linalg.norm(varied, axis=1)
-    np.testing.assert_allclose(most, norm, rtol=1e-4, atol=1e-4)
 
 
 def test_what_is_asked_for_is_what_the_prior_knows_or_what_is_named() -> None:

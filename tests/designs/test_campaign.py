@@ -118,7 +118,7 @@ def test_the_json_holds_what_decides_and_what_is_predicted(design: Planned) -> N
     content = json.loads(design_json(replace(design, campaign=decided_by)))
     decided = {
         "prior": "arm.algid", "command": "algid design arm.algid", "drive": "position",
-        "duration": 2.0, "rate": 500.0, "seed": 0, "interrupted": False, "gravity": 9.81,
+        "duration": 2.0, "rate": 500.0, "seed": 0, "gravity": 9.81,
         "version": __version__, "joints": ["a", "b"], "runs": {"unloaded": 1, "loaded": 1},
         "noise": {"theta1": 1e-3, "theta2": 1e-3, "tau1": 1e-2, "tau2": 1e-2},
         "start": design.motion.theta[:, 0].tolist(),

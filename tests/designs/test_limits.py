@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.base.significance import SURE
 from algid.designs.belief import Load
 from algid.designs.information import Sensitivities
 from algid.designs.limits import Limits, resting, usage
@@ -65,26 +64,6 @@ def test_usages_by_hand() -> None:
     }
     assert used.by_motion is None
     assert TIGHT.height_of(np.array([-0.5, 2.0])) == pytest.approx(height)
-
-
-@pytest.mark.parametrize("box", [True, False])
-def test_the_torque_is_that_of_the_worst_arm_on_either_side(box: bool) -> None:
-    spread = np.zeros((7, 2))
-    spread[3, 0], spread[5, 1] = 0.4, 0.1  # k4 and k6, each by its own
-    slopes = at((0.0, 0.0), (2.0, 0.0), (0.0, 0.0))
-    used = usage(TIGHT, slopes, [load(spread, box=box, loaded=True)], derivatives=False)
-    torque = {
-        (row.joint, row.upper): float(most)
-        for row, most in zip(used.rows, used.most, strict=True)
-        if row.loaded
-    }
-    mean = 4.0 + 1.0 + 0.3 * 2.0  # k4 + k2 + k6 ω
-    more = 0.4 + 0.1 * 2.0 if box else SURE * np.hypot(0.4, 0.1 * 2.0)
-    # corners are rounded by a millionth of the largest torque, of as many arms
-    assert torque[0, True] == pytest.approx((mean + more) / 5.0, abs=1e-4)
-    assert torque[0, False] == pytest.approx((-mean + more) / 5.0, abs=1e-4)
-    # k2, and Coriolis without sin θ2 is nothing
-    assert torque[1, True] == pytest.approx(1.0 / 2.5, abs=1e-4)
 
 
 def test_a_weak_arm_rests_where_it_needs_least() -> None:

@@ -91,16 +91,6 @@ def codes(result: Result) -> set[str]:
     return {notice.code for notice in result.notices}
 
 
-def test_gravity_that_is_compensated_is_told_by_the_logs() -> None:
-    result = told("gravity-compensated")
-    assert result.complete
-    assert not result.verdict.failed
-    assert "GRAVITY_COMPENSATED" in codes(result)
-    assert result.settings["effort"] == "gravity-compensated"
-    assert not {"k2", "k4", "k2+z5", "k4+z4"} & set(result.estimates)
-    right(result, "k1 k3 k5 k6 k7 m_p l1 l2")
-
-
 def test_an_unloaded_arm_without_weight_may_lie_or_be_compensated() -> None:
     result = identify(logs("gravity-compensated")[0], report=False)
     assert result.complete

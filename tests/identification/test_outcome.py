@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-import algid
 from algid.estimators.combine import LogInformation
 from algid.estimators.fit import Fit
 from algid.estimators.prediction import PredictionScore
@@ -240,21 +239,3 @@ def test_that_what_is_only_rounding_is_zero_and_can_be_read_back() -> None:
     assert found.ci95 == (-0.2, 0.2)
     assert estimate(2e-30, 1e-31, 0.2, "N m", "OK").estimate == 2e-30
     assert estimate(2e-30, 1e-31, 0.2, "N m", "OK").std == 0.0
-
-
-def test_a_length_that_contradicts_the_logs_fails_their_payload_and_leads_its_reasons() -> None:
-    unloaded, loaded = algid.synthesise(
-        "case1", torque="wide", duration=3.0, position_noise=1e-3, torque_noise=1e-2
-    )
-    by_l1 = algid.identify(unloaded, loaded=loaded, l1=0.15)
-    by_l2 = algid.identify(unloaded, loaded=loaded, l2=0.15)
-    for name, result in (("l1", by_l1), ("l2", by_l2)):
-        wrong = result.verdict
-        assert wrong.grade == "failed"
-        first = wrong.reasons[0]
-        assert (first.code, first.numbers["name"]) == ("LENGTH_CONTRADICTED", name)
-    alone = algid.identify(unloaded, l1=0.15).verdict
-    assert (alone.grade, alone.reasons[0].code) == ("reservations", "LENGTH_CONTRADICTED")
-    right = algid.identify(unloaded, loaded=loaded, l1=0.1626, l2=0.1232).verdict
-    assert right.grade != "failed"
-    assert "LENGTH_CONTRADICTED" not in {one.code for one in right.reasons}

@@ -15,9 +15,7 @@ from algid.base.errors import LogError
 from algid.estimators import instruments, refined, robust, weak
 from algid.estimators.problem import Problem
 from algid.identification.identify import identify
-from algid.log import Log, Origin, Reading
-from algid.results import Result
-from algid.settings import Settings
+from algid.log import Log
 from algid.signals.segments import Segment, segments
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
@@ -54,30 +52,6 @@ def logged(motion: SimulatedMotion, seed: int, sigma: float = SIGMA) -> Segment:
 def log_of(name: str, passive: int, seed: int) -> Log:
     """One draw of `make passive`."""
     return scenes.log_of(name, passive, seed)
-
-
-def identified(log: Segment, model: str = "auto") -> Result:
-    stamps = np.arange(len(log), dtype=np.int64) * round(1e9 * DT)
-    origin = Origin(
-        "pendubot.csv", "csv", {}, reading=Reading(passive=1 if not log.tau[0].any() else 2)
-    )
-    return identify(Log(stamps, log.theta, log.tau, origin), settings=Settings(model=model))
-
-
-@pytest.mark.parametrize("passive", [1, 2])
-@pytest.mark.parametrize("case", ["case1", "case2"])
-def test_a_joint_without_motor_leaves_all_constants_told(case: str, passive: int) -> None:
-    """With the terms chosen by the log: none of them, and every constant within its interval's
-    reach.
-    """
-    motion, k = moved(case, passive), load_case(case).arm.constants()
-    result = identified(logged(motion, 0))
-    assert result.verdict.grade != "failed"
-    assert result.estimator == "refined"
-    assert np.abs(distances(result, k)).max() < 4
-    stds = np.array([result.parameters[name].std for name in CONSTANT_NAMES])
-    assert np.all(stds < 0.05 * k)
-    assert min(result.fit.residual.r2) > 0.99
 
 
 @pytest.mark.parametrize("estimator", [weak.fit, instruments.fit, refined.fit])

@@ -14,15 +14,6 @@ from algid.signals.filters import (
 )
 
 
-@pytest.mark.parametrize("rate", [1.0, 5.0, 33.0, 80.0])
-def test_slow_sampling_keeps_what_the_kernel_promises(rate: float) -> None:
-    kernel = differentiator(1 / rate, 60.0)
-    n = np.arange(kernel.size) - kernel.size // 2
-    moments = [float(kernel @ (n / rate) ** power) for power in range(7)]
-    scale = (kernel.size / rate) ** np.arange(7) * rate
-    assert np.allclose(np.array(moments) / scale, np.eye(7)[1] / scale[1], atol=1e-12)  # rounding
-
-
 @pytest.mark.parametrize("n", [1, 2, 3, 500])
 def test_a_recursion_is_scipys_and_leaves_its_state(n: int) -> None:
     rng = np.random.default_rng(4)

@@ -11,7 +11,6 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.log import Log, Origin, join
-from algid.signals.segments import segments
 from algid.signals.spacing import spaced
 
 PERIOD = 1e-3
@@ -82,21 +81,6 @@ KINDS: list[Callable[[], tuple[FloatArray, FloatArray]]] = [
     repeated,
     half_a_period,
 ]
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_motion_is_recovered(kind: Callable[[], tuple[FloatArray, FloatArray]]) -> None:
-    log = log_of(*kind())
-    first, *others = segments([log])
-    assert all(part.continues for part in others)
-    start, dt = first.start, first.dt
-    theta = np.concatenate([part.theta for part in (first, *others)], axis=1)
-    # the time base may be a little slower where every tenth sample is merged with a neighbour
-    assert dt == pytest.approx(PERIOD, rel=0.03 if kind is half_a_period else 1e-3)
-    t = log.stamp_ns[0] * 1e-9 + start + dt * np.arange(theta.shape[1])
-    # a cluster's samples are right to its own length in time, 20 µs at 6 rad/s, a cubic between to
-    # far less
-    assert np.abs(theta - moving(t))[:, 20:].max() < (2e-4 if kind is batches else 1.3e-5)
 
 
 @pytest.mark.parametrize("kind", KINDS)
