@@ -153,14 +153,15 @@ def named(sources: str, **more: Any) -> Profile:
 
 
 @pytest.mark.parametrize(
-    ("kind", "told"),
+    ("kind", "late", "told"),
     [
-        (("std_msgs/msg/Int8", "int8 data"), "200 messages .*(std_msgs/msg/Int8)"),
-        ((JOINT_STATE, JOINT_STATE_DEFINITION), "'publisher of /joint_states' has .* 1 and 2"),
+        (("std_msgs/msg/Int8", "int8 data"), 0, "200 messages .*(std_msgs/msg/Int8)"),
+        ((JOINT_STATE, JOINT_STATE_DEFINITION), 0, "'publisher of /joint_states' has .* 1 and 2"),
+        ((JOINT_STATE, JOINT_STATE_DEFINITION), 10**9, "200 samples repeat a stamp"),
     ],
 )
 def test_what_another_publisher_sends_on_a_topic_is_told(
-    kind: tuple[str, str], told: str, tmp_path: Path
+    kind: tuple[str, str], late: int, told: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.mcap"
     with path.open("wb") as stream:
@@ -174,9 +175,8 @@ def test_what_another_publisher_sends_on_a_topic_is_told(
         )
         for _, stamp, data in messages_of(LOG):
             writer.add_message(own, stamp, data, stamp)
-            writer.add_message(
-                other, stamp, data if kind[0] == JOINT_STATE else b"\0\1\0\0\7", stamp
-            )
+            again = data if kind[0] == JOINT_STATE else b"\0\1\0\0\7"
+            writer.add_message(other, stamp + late, again, stamp)
         writer.finish()  # type: ignore[no-untyped-call]
     found = read_log(path)
     assert same(found, LOG)

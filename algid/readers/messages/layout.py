@@ -123,6 +123,13 @@ class MessageLayout:
                     named[full] = Named(place, *parts)
         return named
 
+    @property
+    def paths(self) -> list[str]:
+        """The paths of its numbers as a profile writes them, and its empty lists."""
+        called = {one.place: path for path, one in self.named.items()}
+        numbers = [called.get(place, place) for place in self.numbers]
+        return [*numbers, *(f"{path} (empty)" for path in self.empty)]
+
     def find(self, path: str) -> Number | None:
         """The number at a path, or None; a joint may be called "1", and is meant then."""
         return self.numbers.get(self.named[path].place if path in self.named else path)

@@ -96,7 +96,7 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
         layouts = layouts_of(file, home)
         for channel, path in wanted.items():
             if not any(layout.find(path) for layout in layouts):
-                known = [", ".join([*_paths(one)][:12]) for one in layouts]
+                known = [", ".join(one.paths[:12]) for one in layouts]
                 held = next(filter(None, known), file.listed())
                 setting = "topic" if home == profile.topic else f"{channel}.topic"
                 other = Remedy({setting: None, f"{channel}.source": None})
@@ -235,7 +235,7 @@ def _find_joint_topic(
                     fitting[name] = fields, choice
                     break
                 if names_in(layout):
-                    lacking[name] = f"{name!r} with {', '.join([*_paths(layout)][:12])}"
+                    lacking[name] = f"{name!r} with {', '.join(layout.paths[:12])}"
         except LogError as error:  # another topic may still hold the joints
             refused.append(str(error))
     if _USUAL in fitting or len(fitting) == 1:
@@ -278,11 +278,10 @@ def fields_in(topic: str, layout: MessageLayout) -> dict[str, TopicField]:
     for at, names in layout.texts.items():
         if at.rpartition(".")[2] in NAMES:
             twice += repeated(names)
-    called = _called(layout)
-    for place in layout.numbers:
+    for place, path in zip(layout.numbers, layout.paths, strict=False):
         name, field = place, TopicField(place, topic)
-        if path := called.get(place):
-            one = layout.named[path]
+        one = layout.named.get(path)
+        if one and one.place == place:
             # of a structure's field, of an interface of a DynamicJointState, or of a list
             word = "_".join(each for each in _WORD.findall(one.behind) if each not in _VALUES)
             if one.label in NAMES and (one.behind or one.list in _STEMS):
@@ -293,11 +292,6 @@ def fields_in(topic: str, layout: MessageLayout) -> dict[str, TopicField]:
     if twice:
         raise LookupError(f"its messages name the joint {twice[0]!r} twice")
     return fields
-
-
-def _called(layout: MessageLayout) -> dict[str, str]:
-    """By place of a number its path in which names stand for places."""
-    return {one.place: path for path, one in layout.named.items()}
 
 
 def names_in(layout: MessageLayout) -> tuple[str, ...]:
@@ -328,16 +322,7 @@ def stamp_in(layout: MessageLayout, around: str) -> tuple[str, str] | None:
 def fields_shown(file: MessageFile, number: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Joints in a channel's first message, and its numbers' paths as a profile writes them."""
     layout = _first_layout(file, file.channels[number].topic)
-    return names_in(layout), tuple(_paths(layout))
-
-
-def _paths(layout: MessageLayout) -> Iterator[str]:
-    """The paths of a message's numbers, and its empty lists."""
-    called = _called(layout)
-    for place in layout.numbers:
-        yield called.get(place, place)
-    for path in layout.empty:
-        yield f"{path} (empty)"
+    return names_in(layout), tuple(layout.paths)
 
 
 def _first_layout(file: MessageFile, topic: str) -> MessageLayout:

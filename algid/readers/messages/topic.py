@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -178,14 +179,20 @@ def topic_tables(
                 parts, size = [], 0
         if parts:
             yield clocked(parts)
-        publishers = list[int]()
+        # those of the same joints, unless one begins where the other has ended, as a driver does
+        # that is started again
+        publishers = dict[int, tuple[int, int]]()
         for number in sorted(channels) if len(channels) > 1 else ():
-            batches = file.batches(frozenset((number,)))
-            sound = (one for one in batches if len(one) and not isinstance(one, str))
-            first = next(sound, None)
-            if first is not None and Decoder(wanted, codec).columns(first)[0].any():
-                publishers.append(number)
-        if len(publishers) > 1:
+            times = list[int]()
+            for one in file.batches(frozenset((number,))):
+                if isinstance(one, str) or not len(one):
+                    continue
+                if not (times or Decoder(wanted, codec).columns(one)[0].any()):
+                    break
+                times += int(one.log_ns.min()), int(one.log_ns.max())
+            if times:
+                publishers[number] = min(times), max(times)
+        if any(one[1] > other[0] for one, other in pairwise(sorted(publishers.values()))):
             told.append(several(f"publisher of {topic}", publishers))
         others = Counter[str]()
         for number, channel in file.channels.items():
