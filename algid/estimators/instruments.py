@@ -68,7 +68,7 @@ from algid.signals.segments import Segment
 _ROUNDS = 4
 _STRIDE = 2  # windows overlap four-fold: more add little, and each is simulated
 _STEP = 4e-3  # s: of the simulation at most, in which 10 Hz turn by a quarter of a radian
-_ASTRAY = 100.0  # rad: a simulated window that ends so far from the measured one has run away
+_ASTRAY = 100.0  # rad: a simulated window that turns so far has run away
 _FEWEST = 0.5  # share of the windows that must not go astray
 _TOGETHER = 8 * (weak.PIECE_SAMPLES + 4096)  # samples whose windows are simulated side by side
 
@@ -196,10 +196,10 @@ _Motion = tuple[Windows, Segment, int, NDArray[np.bool_]]
 def _driven(batch: Sequence[_Piece], model: Model, c: FloatArray) -> Iterator[_Motion]:
     """What the torque and `c` (q,) make of each piece's windows, one window after the other."""
     cuts = [cut(piece, windows) for _, piece, windows in batch]
-    start, acts, measured = (np.concatenate(parts, axis=-1) for parts in zip(*cuts, strict=True))
-    steps, counts = len(measured), [own[0].shape[1] for own in cuts]
+    start, acts = (np.concatenate(parts, axis=-1) for parts in zip(*cuts, strict=True))
+    steps, counts = len(acts) // 2, [own[0].shape[1] for own in cuts]
     periods = [OVERLAP * windows.step * windows.dt / steps for _, _, windows in batch]
-    states, good = simulated(model, c, np.repeat(periods, counts), start, acts, measured)
+    states, good = simulated(model, c, np.repeat(periods, counts), start, acts)
     signals = np.concatenate([states, acts[:-1:2]], axis=1)
     for h, last, count in zip(periods, np.cumsum(counts).tolist(), counts, strict=True):
         own = slice(last - count, last)
@@ -217,13 +217,12 @@ def _explained(following: Explained, batch: Sequence[_Piece]) -> Iterator[_Motio
         yield windows, motion or piece, _STRIDE, good
 
 
-def cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray, FloatArray]:
+def cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray]:
     """Every `_STRIDE`-th window of a piece: R windows, each of K steps.
 
     Returns
     -------
-    Angles and velocities (4, R) at their starts, torques (2 K + 1, 2, R) at each half step, and
-    angles (K, 2, R) at the sample nearest to each step
+    Angles and velocities (4, R) at their starts, and torques (2 K + 1, 2, R) at each half step
     """
     length, margin, steps = OVERLAP * windows.step, windows.margin, _steps(windows)
     starts = margin + np.arange(
@@ -232,16 +231,15 @@ def cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray, Float
     instants = starts + length / (2 * steps) * np.arange(2 * steps + 1)[:, None]
     late, samples = windows.shift / windows.dt, np.arange(len(piece))
     acts = np.stack([np.interp(instants - late, samples, tau) for tau in piece.tau], axis=1)
-    measured = piece.theta[:, np.rint(instants[:-1:2]).astype(np.int64)].swapaxes(0, 1)
     if windows.bandwidth is None:
         assert piece.omega is not None  # `Windows.equations` has asked for it
-        return np.concatenate([piece.theta, piece.omega])[:, starts], acts, measured
+        return np.concatenate([piece.theta, piece.omega])[:, starts], acts
     reach = half_length(piece.dt, windows.bandwidth)
     start = [
         correlate(piece.theta, kernel(piece.dt, windows.bandwidth))[:, starts - reach]
         for kernel in (smoother, differentiator)
     ]
-    return np.concatenate(start), acts, measured
+    return np.concatenate(start), acts
 
 
 def simulated(
@@ -250,7 +248,6 @@ def simulated(
     h: FloatArray,
     start: FloatArray,
     acts: FloatArray,
-    measured: FloatArray,
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """The motion that windows cut from logs would have had, in steps of `h` (R,) s.
 
@@ -261,9 +258,9 @@ def simulated(
     Returns
     -------
     Angles and velocities (K, 4, R), and the windows (R,) that have not gone astray: their mass
-    matrix is positive definite, and they are near the `measured` angles, all along
+    matrix is positive definite, and they are near where they started, all along
     """
-    states = np.empty((len(measured), *start.shape))
+    states = np.empty((len(acts) // 2, *start.shape))
     # what moves no arm is judged afterwards
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for step, state in enumerate(states):
@@ -272,7 +269,7 @@ def simulated(
             start = np.clip(ahead, -1e6, 1e6)
     (m11, m12), (_, m22) = inertia(model, c, states[:, :2].swapaxes(0, 1))
     good = np.all((m11 > 0) & (m11 * m22 > m12**2), axis=0)
-    good &= np.abs(states[:, :2] - measured).max(axis=(0, 1)) < _ASTRAY
+    good &= np.abs(states[:, :2] - states[0, :2]).max(axis=(0, 1)) < _ASTRAY
     # A window that went astray is left out; products of its velocities would overflow.
     states[..., ~good] = 0.0
     return states, good
@@ -331,31 +328,19 @@ def followed(problem: Problem) -> Explained | None:
 def _features(piece: Segment) -> FloatArray | None:
     """F (m, N), the last row 1; None where most samples of the piece have no reference.
 
-    Before its beginning, and where it has none, a reference is taken to have stood still.
+    Before its beginning a reference is taken to have stood still; over gaps it is straight.
     """
-    reference = _filled(piece.reference)
-    if reference is None:
+    if piece.reference is None:
+        return None
+    good = np.all(np.abs(piece.reference) < _FARTHEST, axis=0)
+    if np.mean(good) < _KNOWN:
         return None
     count = len(piece)
     lags = np.unique(
         np.rint(_LONGEST / piece.dt * (np.arange(_LAGS) / (_LAGS - 1)) ** 2).astype(np.int64)
     )
-    at = np.maximum(np.arange(count) - lags[:, None], 0)
-    ago = reference[:, at].reshape(-1, count)
-    return np.concatenate([ago, np.ones((1, count))])
-
-
-def _filled(reference: FloatArray | None) -> FloatArray | None:
-    """A reference (2, N) with the last one before each sample that has none.
-
-    At the beginning the first. None where fewer than `_KNOWN` of the samples have one.
-    """
-    if reference is None:
-        return None
-    good = np.all(np.abs(reference) < _FARTHEST, axis=0)
-    if good.all():
-        return reference
-    if np.mean(good) < _KNOWN:
-        return None
-    place = np.maximum.accumulate(np.where(good, np.arange(good.size), 0))
-    return reference[:, np.maximum(place, np.argmax(good))]
+    ago = [
+        np.interp(np.arange(count) - lags[:, None], np.flatnonzero(good), row[good])
+        for row in piece.reference
+    ]
+    return np.concatenate([*ago, np.ones((1, count))])
