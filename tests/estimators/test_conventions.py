@@ -109,26 +109,15 @@ def wrongs(motion: SimulatedMotion) -> dict[str, Callable[[], Pair]]:
     sign = np.tanh(motion.omega / 0.02)
     return {
         "nothing": lambda: (theta, tau),
-        "a common gain": lambda: (theta, 6 * tau),
         "gains": lambda: (theta, tau * np.array([[1.2], [0.8]])),
         "late": lambda: (theta[:, :-20], tau[:, 20:]),
-        "early": lambda: (theta[:, 20:], tau[:, :-20]),
         "held": lambda: (theta, np.repeat(tau[:, ::10], 10, axis=1)[:, : theta.shape[1]]),
         "Coulomb": lambda: (theta, tau + 0.3 * size * sign),
         "load": lambda: (theta, tau + 0.2 * np.abs(tau) * sign),
         "ripple": lambda: (theta, tau + 0.1 * size * np.sin(20 * motion.theta)),
-        "slow": lambda: (
-            theta,
-            tau + 0.2 * size * np.cumsum(rng.standard_normal(tau.shape), axis=1) / 40,
-        ),
         "offset": lambda: (theta, tau + 0.2 * size),
         "noise": lambda: (theta, tau + 0.3 * size * rng.standard_normal(tau.shape)),
         "nothing but noise": lambda: (theta, size * rng.standard_normal(tau.shape)),
-        "coarse": lambda: (np.round(theta / 5e-3) * 5e-3, tau),
-        "lost": lambda: (
-            np.delete(theta, np.s_[::20], axis=1),
-            np.delete(tau, np.s_[::20], axis=1),
-        ),
     }
 
 
