@@ -55,9 +55,8 @@ class ResidualSums:
     stride : rows after which white noise leaves nothing in common
     power : (s, bins), Σ P by bin
     lines, scatter : (bins,), lines in each bin, and their sum's variance for unit white noise
-    products, pairs : (2, lags + 1) and (lags + 1,), Σ w_i w_(i+lag) and of how many pairs
-    counts, scaled : (3,) and (3, 2, 1 + `_LAGS`), rows summed over each of `SCALES`, and the
-        products of those sums by lag: see `judge`
+    products : (3, 2, lags + 1), Σ w_i w_(i+lag) of the rows' sums over each of `SCALES`
+    pairs, counts : (lags + 1,) and (3,), pairs of rows by lag, and sums over each of `SCALES`
     """
 
     dt: float
@@ -68,7 +67,6 @@ class ResidualSums:
     products: FloatArray
     pairs: FloatArray
     counts: FloatArray
-    scaled: FloatArray
 
     def __post_init__(self) -> None:
         keep_arrays(self)
@@ -97,29 +95,24 @@ def residual_sums(w: FloatArray, dt: float, stride: int = 1, lags: int = LAGS) -
     far = _NEIGHBOURS[1] * np.maximum(lines - 2, 0.0)
     scatter = lines + 2 * (near + far)
     pairs = np.maximum(n - np.arange(lags + 1, dtype=np.float64), 0.0)
-    counts, scaled = [], []
+    counts, products = [], []
     for scale in SCALES:
         whole = n // scale
         x = w[:2, : whole * scale].reshape(2, whole, scale).sum(axis=2) / np.sqrt(scale)
         counts.append(float(whole))
-        scaled.append(_lag_products(x, _LAGS))
+        products.append(
+            [[row[lag:] @ row[: max(0, row.size - lag)] for lag in range(lags + 1)] for row in x]
+        )
     return ResidualSums(
         dt,
         stride,
         power.astype(np.float64),
         lines,
         scatter,
-        _lag_products(w[:2], lags),
+        np.array(products),
         pairs,
         np.array(counts),
-        np.array(scaled),
     )
-
-
-def _lag_products(x: FloatArray, lags: int) -> FloatArray:
-    """Sums (2, 1 + lags) of the products of rows of x (2, n) with themselves, so much later."""
-    n = x.shape[1]
-    return np.array([[row[lag:] @ row[: max(0, n - lag)] for lag in range(lags + 1)] for row in x])
 
 
 def pooled(sums: Sequence[ResidualSums]) -> ResidualSums | None:
@@ -189,7 +182,7 @@ def autocorrelation(sums: ResidualSums) -> Autocorrelation:
     The band is Bartlett's for a moving average over one stride: its variance is Σ r_i² / n, over
     lags i within the stride, both ways (Bartlett 1946; Box & Jenkins, sec. 2.1.6).
     """
-    mean = sums.products / np.maximum(sums.pairs, 1.0)
+    mean = sums.products[0] / np.maximum(sums.pairs, 1.0)
     r = np.divide(mean, mean[:, :1], out=np.zeros_like(mean), where=mean[:, :1] > 0)
     known = np.flatnonzero(sums.pairs[:: sums.stride] > sums.pairs[0] / 4)[1:] * sums.stride
     variance = 1 + 2 * np.sum(r[:, 1 : sums.stride] ** 2, axis=1)
@@ -200,7 +193,7 @@ def autocorrelation(sums: ResidualSums) -> Autocorrelation:
 def whiteness_of(sums: ResidualSums) -> Spectra:
     """Spectra of the residual alone in shares of white noise of the same variance: 1 is white."""
     raw = spectra(sums)
-    variance = (sums.products[:, 0] / np.maximum(sums.pairs[0], 1.0))[:, None]
+    variance = (sums.products[0, :, 0] / np.maximum(sums.pairs[0], 1.0))[:, None]
     level = 2 * sums.dt * variance
     share = np.divide(raw.density[:2], level, out=np.zeros_like(raw.density[:2]), where=level > 0)
     return Spectra(raw.frequency, share, raw.low, raw.high)
@@ -240,8 +233,8 @@ def judge(sums: ResidualSums) -> Whiteness:
     Ljung & Box 1978: n (n + 2) Σ ρ_l² / (n − l) over the lags l is χ² with as many degrees of
     freedom.
     """
-    power = np.maximum(sums.scaled[:, :, :1], 1e-300)
-    rho = sums.scaled[:, :, 1:] / power
+    power = np.maximum(sums.products[:, :, :1], 1e-300)
+    rho = sums.products[:, :, 1 : 1 + _LAGS] / power
     n = sums.counts[:, None, None]
     lags = np.arange(1, _LAGS + 1)
     tested = lags < n / 4

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial, reduce
+from functools import reduce
 from operator import add
 
 import numpy as np
@@ -68,19 +68,14 @@ class Outcome:
     """What one pass over pieces of a log gives.
 
     `deviance` is minus twice the log-likelihood at the pass's coefficients, but for a constant;
-    `noise_change` the largest change of a log variance in its deviations; `sums` give those over
-    each piece's innovations, which most passes do not need.
+    `residual` the sums over the innovations, and `noise_change` the largest change of a log
+    variance in its deviations.
     """
 
     information: LogInformation
-    sums: tuple[Callable[[], ResidualSums], ...]
+    residual: ResidualSums
     deviance: float
     noise_change: float = 0.0
-
-    @cached_property
-    def residual(self) -> ResidualSums:
-        """Sums over the innovations."""
-        return reduce(add, [one() for one in self.sums])
 
 
 class LogEvidence:
@@ -92,8 +87,6 @@ class LogEvidence:
     loaded : bool
     shift : TorqueShift
         After how long a logged torque acts; its delay is where none is estimated.
-    known : NoiseLevels or None
-        Noise levels that are not to be estimated.
 
     `kept` is empty where the log has no piece long enough; `sure` says that its noise levels stay,
     `smooth` that derivatives by coefficients are taken at smoothed trajectories, `by_motion` that
@@ -105,13 +98,11 @@ class LogEvidence:
         source: Source,
         loaded: bool,
         shift: TorqueShift,
-        known: NoiseLevels | None,
     ) -> None:
         self.loaded = loaded
         self.sure = self.smooth = self.by_motion = False
         self._source = source
         self._shift = shift
-        self._known = known
         kept, self.whole = spread_pieces(self._pieces(), _TRAINED, PIECE_SAMPLES)
         self.kept = [replace(piece, omega=None) for piece in kept]
         if not self.kept:
@@ -125,15 +116,10 @@ class LogEvidence:
         squares = np.mean([roughness(piece.tau) ** 2 for piece in self.kept], axis=0)
         self._rough = np.maximum(guess.tau, np.sqrt(squares))
         self._floor = replace(floor, tau=np.maximum(floor.tau, SURE * guess.tau))
-        self.noise = known or self._guess
+        self.noise = guess
         rms = np.max([np.sqrt(np.mean(piece.tau**2, axis=1)) for piece in self.kept], axis=0)
         # A joint without a motor carries a load of the size of the other's.
         self._least = _NEGLIGIBLE * np.where(rms > 0, rms, rms.max())
-
-    @property
-    def noise_known(self) -> bool:
-        """Whether its noise levels are given, and not estimated."""
-        return self._known is not None
 
     def _pieces(self) -> Iterator[Segment]:
         return pieces(self._source(), PIECE_SAMPLES, SHORTEST)
@@ -167,12 +153,12 @@ class LogEvidence:
         """Linearise the training set at the parameters `beta` (Q,) of `shared`.
 
         Keeps the trajectories found, and, where they are `free`, better noise levels, which the
-        trajectories and the score follow. Levels that are known, or sure, stay.
+        trajectories and the score follow. Levels that are sure stay.
         """
         gathered, c = _Gathered(), shared.coefficients(beta, self.loaded)
         scores: list[VarianceScore] = []
         responses: list[FloatArray] = []
-        scored = free and self._known is None and not self.sure
+        scored = free and not self.sure
         for seed, (piece, theta) in enumerate(zip(self.kept, self._trajectories, strict=True)):
             linear = self._linearise(shared, c, theta, piece)
             asked = linear.columns if scored else linear.columns[-1:]
@@ -206,7 +192,7 @@ class LogEvidence:
 
     def forget_noise(self) -> None:
         """Noise levels start where they did."""
-        self.noise, self.sure = self._known or self._guess, False
+        self.noise, self.sure = self._guess, False
 
     def run(self, shared: Shared, beta: FloatArray) -> Outcome:
         """Pass over the whole log at `beta`; each piece has its own trajectory."""
@@ -216,8 +202,7 @@ class LogEvidence:
             first = self._linearise(shared, c, start, piece, residual_only=True)
             multiplier = first.solve_transposed(first.columns[-1:])[0]
             theta = trajectory(piece, first, multiplier, self.noise)
-            linear = self._linearise(shared, c, theta, piece)
-            gathered.take(linear, piece.dt, self.noise, at_once=True)
+            gathered.take(self._linearise(shared, c, theta, piece), piece.dt, self.noise)
         return gathered.outcome(self.loaded, c)
 
     @property
@@ -278,7 +263,7 @@ class LogEvidence:
         )
 
 
-def opened(problem: Problem, noise: NoiseLevels | None = None) -> list[LogEvidence]:
+def opened(problem: Problem) -> list[LogEvidence]:
     """The logs that are long enough.
 
     Raises
@@ -289,7 +274,7 @@ def opened(problem: Problem, noise: NoiseLevels | None = None) -> list[LogEviden
     logs: list[LogEvidence] = []
     shift = problem.settings.shift
     for loaded, sources in problem.kinds():
-        every = [LogEvidence(one, loaded, shift, noise) for one in sources]
+        every = [LogEvidence(one, loaded, shift) for one in sources]
         kept = [log for log in every if log.kept]
         if not kept:
             kind = "loaded" if loaded else "unloaded"
@@ -315,7 +300,7 @@ class _Gathered:
 
     def __init__(self) -> None:
         self._S, self._g, self._by_noise = BlockSums(), BlockSums(), BlockSums()
-        self._sums: list[Callable[[], ResidualSums]] = []
+        self._residual: list[ResidualSums] = []
         self._deviance = 0.0
 
     def take(
@@ -324,13 +309,10 @@ class _Gathered:
         dt: float,
         noise: NoiseLevels,
         by_noise: FloatArray | None = None,
-        *,
-        at_once: bool = False,
     ) -> None:
         """Add a piece, its samples `dt` s apart, whitened by such noise.
 
-        `by_noise` (4, 2 n) is how the innovations fall with each log variance. Those are added up
-        `at_once`, or kept for whoever asks.
+        `by_noise` (4, 2 n) is how the innovations fall with each log variance.
         """
         columns, w = linear.columns, linear.columns[-1]
         own = w @ w + 2 * np.log(linear.factor[-1]).sum() + w.size * np.log(noise.tau).sum()
@@ -347,17 +329,12 @@ class _Gathered:
         self._g.add(gram[:, :, q])
         if by_noise is not None:
             self._by_noise.add(gram[:, :, q + 1 :])
-        innovations = np.ascontiguousarray(w.reshape(-1, 2).T)
-        if at_once:
-            total = residual_sums(innovations, dt)
-            self._sums.append(lambda: total)
-        else:
-            self._sums.append(partial(residual_sums, innovations, dt))
+        self._residual.append(residual_sums(np.ascontiguousarray(w.reshape(-1, 2).T), dt))
 
     def outcome(self, loaded: bool, c: FloatArray) -> Outcome:
         """What the pass at the coefficients `c` has given."""
         information = LogInformation(loaded, c, self._S.values(), self._g.values())
-        return Outcome(information, tuple(self._sums), self._deviance)
+        return Outcome(information, reduce(add, self._residual), self._deviance)
 
     def followed(
         self, information: LogInformation, step: FloatArray, score: VarianceScore

@@ -118,7 +118,7 @@ class Products:
         self.names = self.shared.log_names + WIDTHS
         rigid = within(self.names, loads_of(self.shared.model))
         both = len({log.loaded for log in logs}) == 2
-        self._labels = np.array(self.names + both * rigid)
+        self._labels = self.names + both * rigid
         self.size = len(self._labels)
         self._base = base
         self.determinant = 0.0
@@ -156,7 +156,8 @@ class Products:
         """Where a log's coefficients and widths stand in p."""
         places, apart = np.split(np.arange(self.size), [len(self.names)])
         if loaded:
-            places[np.isin(self.names, self._labels[apart])] = apart
+            for place in apart:
+                places[self.names.index(self._labels[place])] = place
         return places
 
     def columns(self, terms: Iterable[str]) -> NDArray[np.int64]:
@@ -171,7 +172,7 @@ class Products:
 
     def _named(self, names: Collection[str]) -> NDArray[np.int64]:
         """Places in p of coefficients by name, the loaded arm's with them."""
-        return np.flatnonzero(np.isin(self._labels, list(names)))
+        return np.flatnonzero([label in names for label in self._labels])
 
     def solve(self, columns: NDArray[np.int64]) -> tuple[FloatArray, float, FloatArray]:
         """Least squares on `columns`: p (P,), the squares left, and the inverse of its matrix."""

@@ -19,7 +19,7 @@ with β′ the change of the best parameters with x.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import reduce
 from operator import add
 from typing import Literal
@@ -43,8 +43,7 @@ from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem
 from algid.estimators.repeats import Groups, grouped
 from algid.estimators.weak import fit as weak_fit
-from algid.estimators.whitening import NoiseLevels
-from algid.model import TERMS, Model, attributes
+from algid.model import TERMS, attributes
 from algid.notices import Notice
 from algid.signals.segments import Segment
 
@@ -68,15 +67,13 @@ _ANCHOR = 1e-3  # of a parameter's size: how firmly a direction without informat
 End = Literal["settled", "refuted", "unsettled"]
 
 
-def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
+def fit(problem: Problem) -> Fit:
     """Most likely parameters of the arm, and of its payload where there are loaded logs.
 
     Parameters
     ----------
     problem : Problem
         Its window and bandwidth are of the weak estimate that this starts from.
-    noise : NoiseLevels
-        Known noise levels; None estimates them log by log.
 
     Returns
     -------
@@ -88,16 +85,10 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
     ------
     TooShortError
         If there is no log, or no log long enough.
-    ValueError
-        If a known noise level is not positive.
     """
-    if noise is not None and not (np.all(noise.theta > 0) and np.all(noise.tau > 0)):
-        raise ValueError(
-            f"known noise levels must be positive, got {noise.theta} rad and {noise.tau} N m"
-        )
     start, prior, progress = weak_fit(problem), problem.prior, problem.progress
     shared, anchored = start.shared, _anchored(start)
-    logs = opened(problem, noise)
+    logs = opened(problem)
     turn, dt = max((largest_turn(log.kept), log.kept[0].dt) for log in logs)
     if turn > FAR:
         numbers = {"case": "turn", "kept": start.estimator, "turn": turn, "rate": turn / FAR / dt}
@@ -110,9 +101,9 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
 
     try:
         beta, outcomes, iterations, end = _train(shared, logs, start.values, anchored, progress)
-        width = None
-        if has_width(shared.model):
-            shared, beta, outcomes, end, width = _settled_width(
+        of_width: FloatArray = np.zeros(())
+        if any(_SHAPE in TERMS[term].shapes for term in shared.model.terms):
+            shared, beta, outcomes, end, of_width = _settled_width(
                 shared, logs, (beta, outcomes, end), anchored, progress
             )
         if end == "refuted":
@@ -139,24 +130,18 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
         samples=samples,
         repeats=_repeats(logs),
     )
-    if width is not None:
-        fitted = replace(fitted, covariance=fitted.covariance + width.covariance)
-    if noise is None:
-        tested = evenly_spread(logs, _MOST_TESTED)
-        for log in tested:
-            log.smooth, log.by_motion = True, not attributes(shared.model, "elastic")
-        at = {}
-        for log in tested:
-            c = shared.coefficients(fitted.values, log.loaded)
-            at[log.loaded] = dict(zip(shared.log_names, c.tolist(), strict=True))
-        try:
-            products = Products(tested, shared.model, at, problem.settings.shift.delay, shapes)
-            p_value = misfit(tested, (log.noise.tau for log in tested), fitted, products)
-        except np.linalg.LinAlgError:  # of joints that never move
-            return given_up("not converged")
-        if p_value < level("REFUTED"):
-            return replace(given_up("motion", p_value=p_value), products=products)
-        fitted = replace(fitted, products=products)
+    tested, at = evenly_spread(logs, _MOST_TESTED), {}
+    for log in tested:
+        log.smooth, log.by_motion = True, not attributes(shared.model, "elastic")
+        c = shared.coefficients(fitted.values, log.loaded)
+        at[log.loaded] = dict(zip(shared.log_names, c.tolist(), strict=True))
+    try:
+        products = Products(tested, shared.model, at, problem.settings.shift.delay, shapes)
+        p_value = misfit(tested, (log.noise.tau for log in tested), fitted, products)
+    except np.linalg.LinAlgError:  # of joints that never move
+        return given_up("not converged")
+    if p_value < level("REFUTED"):
+        return replace(given_up("motion", p_value=p_value), products=products)
     # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.
     status = list(fitted.status)
     for place, before in enumerate(start.status):
@@ -165,12 +150,14 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
     return with_body(
         replace(
             fitted,
+            covariance=fitted.covariance + of_width,
             status=tuple(status),
             unidentifiable=tuple(dict.fromkeys(fitted.unidentifiable + start.unidentifiable)),
             noise=tuple(log.noise for log in logs),
             whiteness=whiteness,
             residual=tuple(outcome.residual for outcome in outcomes),
             iterations=iterations,
+            products=products,
         )
     )
 
@@ -225,13 +212,12 @@ def _train(
 ) -> tuple[FloatArray, list[Outcome], int, End]:
     """Parameters, the last pass over each log, steps taken, and how the alternation ended."""
     total = sum(log.trained for log in logs)
-    known = any(log.noise_known for log in logs)
     many = len(logs) > _MOST_SCORED
     share, before = 1.0, np.zeros_like(beta)
     for iteration in range(1, _STEPS + 1):
         outcomes: list[Outcome] = []
         done = 0
-        free = not known and iteration <= _NOISE_STEPS
+        free = iteration <= _NOISE_STEPS
         for log in logs:
             outcomes.append(log.train(shared, beta, free=free))
             done += log.trained
@@ -254,9 +240,9 @@ def _train(
             for log, outcome in zip(logs, outcomes, strict=True):
                 log.sure = outcome.noise_change < _NOISE_SETTLED
         improved = max(outcome.noise_change for outcome in outcomes)
-        levels = (log.noise.tau for log in logs)
+        levels = [log.noise.tau for log in logs]
         # on the way to its level noise may be larger
-        if not known and improved < _NOISE_SETTLED and misfit(logs, levels) < level("REFUTED"):
+        if improved < _NOISE_SETTLED and misfit(logs, levels) < level("REFUTED"):
             return beta, outcomes, iteration, "refuted"
         settled = moved < SETTLED
         if moved < earlier:
@@ -285,8 +271,8 @@ def _settled_width(
     trained: tuple[FloatArray, list[Outcome], End],
     prior: Prior | None,
     progress: Progress | None,
-) -> tuple[Shared, FloatArray, list[Outcome], End, Width | None]:
-    """What was `trained`, at the likeliest width of friction's step, and that width.
+) -> tuple[Shared, FloatArray, list[Outcome], End, FloatArray]:
+    """What was `trained`, at the likeliest width of friction's step, and what that adds (Q, Q).
 
     The weak form sees friction through a differentiator whose noise blurs the step: what it takes
     for the width may be several times the true one. The likelihood may be refuted by that alone.
@@ -303,17 +289,16 @@ def _settled_width(
         better, _, value = combine(other, informations, beta, prior)
         return sum(outcome.deviance for outcome in seen) - 2 * value, better
 
-    width = None
     for _ in range(_WIDTHS):
         now = shared.model.coulomb_speed
-        width = likeliest_width(profile, now)
-        moved = abs(np.log(width.value / now))
+        width, added = likeliest_width(profile, now)
+        moved = abs(np.log(width / now))
         if moved < _WIDTH_SETTLED or (end != "settled" and moved < _WIDTH_FAR):
             break
         before = shared, beta, outcomes
         was_settled = end == "settled"
         states = [log.state for log in logs]
-        shared = replace(shared, model=replace(shared.model, coulomb_speed=width.value))
+        shared = replace(shared, model=replace(shared.model, coulomb_speed=width))
         for log in logs:
             log.forget_noise()
         beta, outcomes, _, end = _train(shared, logs, beta, prior, progress)
@@ -321,10 +306,10 @@ def _settled_width(
             shared, beta, outcomes = before
             for log, state in zip(logs, states, strict=True):
                 log.restore(state)
-            return shared, beta, outcomes, "settled", width
+            return shared, beta, outcomes, "settled", added
         if end != "settled":
             break
-    return shared, beta, outcomes, end, width
+    return shared, beta, outcomes, end, added
 
 
 def _finish(
@@ -359,21 +344,10 @@ _HALF_OCTAVE = 0.5 * np.log(2.0)
 _SHAPE = "coulomb_speed"
 
 
-@dataclass(frozen=True, eq=False)
-class Width:
-    """The width in rad/s, and what not knowing it adds to the parameters' covariance (Q, Q)."""
+def likeliest_width(profile: Profile, start: float) -> tuple[float, FloatArray]:
+    """The width in rad/s at which the deviance is least, walking from `start`.
 
-    value: float
-    covariance: FloatArray
-
-
-def has_width(model: Model) -> bool:
-    """Whether a term of the model has friction's step."""
-    return any(_SHAPE in TERMS[term].shapes for term in model.terms)
-
-
-def likeliest_width(profile: Profile, start: float) -> Width:
-    """The width at which the deviance is least, walking from `start`.
+    With it what not knowing it adds to the parameters' covariance (Q, Q).
 
     Parameters
     ----------
@@ -399,9 +373,9 @@ def likeliest_width(profile: Profile, start: float) -> Width:
     x, h = first + place * _HALF_OCTAVE, _HALF_OCTAVE
     below, here, above = (deviance(place + side) for side in (-1, 0, 1))
     if not np.isfinite([below, above]).all():
-        return Width(float(np.exp(x)), np.zeros((seen[place][1].size,) * 2))
+        return float(np.exp(x)), np.zeros((seen[place][1].size,) * 2)
     slope, curvature = (above - below) / (2 * h), max((below - 2 * here + above) / h**2, 1e-300)
     change = (seen[place + 1][1] - seen[place - 1][1]) / (2 * h)
     variance = min(2.0 / curvature, (high - low) ** 2 / 12)
     bottom = x + float(np.clip(-slope / curvature, -h, h))
-    return Width(float(np.exp(bottom)), variance * np.outer(change, change))
+    return float(np.exp(bottom)), variance * np.outer(change, change)

@@ -121,20 +121,15 @@ class Selection:
     hold_by: Literal["logs", "settings", "parameters"] = "settings"
     late: Lateness | None = None
 
-    def changed(self, terms: Collection[str], reason: str, *, kept: bool) -> Selection:
-        """The same with `terms`, or without them, whose trials end so for this `reason`."""
-        own, delay = without_delay(terms), not set(DELAYS).isdisjoint(terms)
-        ended = [
-            replace(trial, kept=kept, reason=reason) if trial.term in terms else trial
+    def without(self, terms: Collection[str], reason: str) -> Selection:
+        """The same without `terms`, whose trials end so for this `reason`."""
+        trials = [
+            replace(trial, kept=False, reason=reason) if trial.term in terms else trial
             for trial in self.trials
         ]
-        model = self.model.terms + own if kept else outside(self.model.terms, own)
-        return replace(
-            self,
-            model=replace(self.model, terms=model),
-            delay=kept if delay else self.delay,
-            trials=tuple(ended),
-        )
+        model = replace(self.model, terms=outside(self.model.terms, terms))
+        delay = self.delay and set(DELAYS).isdisjoint(terms)
+        return replace(self, model=model, delay=delay, trials=tuple(trials))
 
     @property
     def undetermined(self) -> Lateness | None:

@@ -258,7 +258,7 @@ def _of_motorless(
     if picked.chosen_by == "logs":
         terms = within(terms, FIRST_TERMS)
     dropped = {trial.term for trial in picked.trials if trial.kept}.difference(terms)
-    plainer = replace(picked.changed(dropped, _BY_NOTHING, kept=False), delay=False, late=None)
+    plainer = replace(picked.without(dropped, _BY_NOTHING), delay=False, late=None)
     if plainer.hold_by == "logs":
         plainer = replace(plainer, hold="foh")
     better = robust.of_passive_joint(problem_of(survey, settings, plainer, prior))
@@ -272,7 +272,7 @@ def _of_motorless(
     }
     nothing = outside(plainer.model.terms, evident.union(settings.terms))
     if nothing:
-        poorer = plainer.changed(nothing, _ZERO, kept=False)
+        poorer = plainer.without(nothing, _ZERO)
         without = robust.of_passive_joint(problem_of(survey, settings, poorer, prior))
         if without is not None:
             return without, poorer

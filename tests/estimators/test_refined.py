@@ -98,6 +98,6 @@ def test_long_logs_take_one_more_pass_and_agree(
         (residual,) = fit.residual
         assert residual.pairs[0] == pytest.approx(4001 - 9 * (POINTS - 1), abs=POINTS)
         assert fit.freedom == pytest.approx(residual.pairs[0], abs=9)
-        assert residual.products[:, 0] / residual.pairs[0] == pytest.approx(
+        assert residual.products[0, :, 0] / residual.pairs[0] == pytest.approx(
             1, abs=0.09
         )  # four standard errors

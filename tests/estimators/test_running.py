@@ -9,7 +9,6 @@ import pytest
 
 from algid.estimators import refined, weak
 from algid.estimators.fit import Fit, has_running, running
-from algid.estimators.whitening import NoiseLevels
 
 from .conftest import Bench, problem_of
 
@@ -36,22 +35,19 @@ def test_it_ends_where_the_fit_does(bench: Bench, estimator: str) -> None:
 
 
 def test_half_way_it_is_what_half_of_the_log_tells(bench: Bench) -> None:
-    """Its value and its band are those of a fit of that half alone, whose intervals hold the truth
-    19 times of 20.
-    """
-    log = bench.log(sigma=1e-4, seed=2)
-    known = NoiseLevels(np.full(2, 1e-4), np.full(2, 1e-3))
-    whole, half = (refined.fit(problem_of(log.part(0, end)), noise=known) for end in (4001, 2001))
+    """By the normal equations of the stretches up to then, as wide beside them as the fit is."""
+    whole = _fit(bench, "refined", 2, loaded=False)
+    (log,) = whole.logs
     found = running(whole, [4.0], 8)
     place = int(np.argmin(np.abs(found["t"] - 2.0)))
     assert found["t"][place] == pytest.approx(2.0, abs=0.04)
-    beta, width = (
-        np.array([found[name + end][place] for name in whole.names]) for end in ("", "_half")
-    )
-    # blocks end within 1 % of the half, and each is linearised at the whole's estimate; intervals
-    # of 90 %: 16 % less
-    np.testing.assert_allclose(width, half.quantile * half.std, rtol=0.03)
-    assert np.all(np.abs(beta - half.values) < 0.5 * half.std)
+    end = round(found["t"][place] / 4.0 * len(log.S))
+    every, half = (np.linalg.inv(log.S[:one].sum(axis=0)) for one in (None, end))
+    wider = whole.quantile * whole.std / np.sqrt(np.diag(every))
+    values = log.c0 + half @ log.g[:end].sum(axis=0)
+    beta, width = ([found[name + tail][place] for name in whole.names] for tail in ("", "_half"))
+    np.testing.assert_allclose(beta, values, rtol=1e-6)
+    np.testing.assert_allclose(width, wider * np.sqrt(np.diag(half)), rtol=1e-6)
 
 
 def test_a_fit_held_within_bounds_has_none(bench: Bench) -> None:

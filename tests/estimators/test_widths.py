@@ -61,9 +61,9 @@ def test_the_parabola_through_the_lowest_values_has_the_widths_variance(start: f
         x = np.log(width / 0.03)
         return float((x / 0.2) ** 2), np.array([3.0, -1.0]) * x
 
-    found = likeliest_width(profile, start)
-    assert found.value == pytest.approx(0.03)
-    np.testing.assert_allclose(found.covariance, 0.2**2 * np.outer([3, -1], [3, -1]))
+    width, added = likeliest_width(profile, start)
+    assert width == pytest.approx(0.03)
+    np.testing.assert_allclose(added, 0.2**2 * np.outer([3, -1], [3, -1]))
 
 
 def test_friction_that_is_not_there_leaves_its_width_open_and_nothing_else() -> None:
