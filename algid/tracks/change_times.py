@@ -33,7 +33,8 @@ from algid.model import inertia
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.segments import Segment, append
 from algid.tracks.arm import IdentifiedArm
-from algid.tracks.change_points import PENALTY
+from algid.tracks.cells import CELL
+from algid.tracks.change_points import PENALTY, SHORTEST
 from algid.tracks.drift import Drift
 
 STEP = 5e-3  # s, between candidates
@@ -224,9 +225,13 @@ def confirmed(
                 yield groups[at], rows_of(piece, arm, drift, moments, own[first : last + 2])
 
     def within(rows: Rows, low: float, high: float) -> ChangeTime | None:
-        """The change between `low` and `high` s; None where the rows are too few."""
+        """The change between `low` and `high` s; None where the rows have not both its sides.
+
+        A hole in the log is such a place: there cells alone show a change.
+        """
+        middle = (low + high) / 2
         low, high = max(low, float(rows.t[0]) + MARGIN), min(high, float(rows.t[-1]) - MARGIN)
-        return place(rows, low, high, variance) if low < high else None
+        return place(rows, low, high, variance) if low < middle < high else None
 
     def shift() -> None:
         """Move each change to where the rows about it have it, which depend on where it was."""
@@ -244,7 +249,8 @@ def confirmed(
     while places and len(places) != count:
         count = len(places)
         shift()
-        # Close changes whose rows need only one become one: a jolt is no change of payload.
+        # Close changes whose rows need only one become one: a jolt is no change of payload. So do
+        # those between which nothing can be carried: a jolt of a heavy payload needs both.
         times = np.array([one.time for one in places])
         close = [(at, at + 1) for at in np.flatnonzero(np.diff(times) < CLOSE).tolist()]
         single: dict[int, ChangeTime] = {}
@@ -252,7 +258,8 @@ def confirmed(
             one = within(rows, times[first] - MARGIN, times[last] + MARGIN)
             if one is not None:
                 both = explained(rows, times[[first, last]])
-                if both - explained(rows, np.array([one.time])) < penalty:
+                short = times[last] - times[first] < SHORTEST * CELL
+                if short or both - explained(rows, np.array([one.time])) < penalty:
                     single[first] = one
         following = len(places)
         for first, one in sorted(single.items(), reverse=True):

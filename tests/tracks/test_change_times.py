@@ -11,6 +11,7 @@ import algid
 from algid.log import Log
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.segments import segments
+from algid.synth.run import Acquisition, excitation, synthesise
 from algid.tracks.change_times import (
     ChangeTime,
     confirmed,
@@ -20,7 +21,7 @@ from algid.tracks.change_times import (
     windows,
 )
 from algid.tracks.drift import Drift
-from tests.tracks.folders import carrier, noisy
+from tests.tracks.folders import CASE, carrier, noisy
 
 ARM = carrier()
 STEADY = Drift(np.array([0.0, 5.0]), np.zeros((2, 2)), np.zeros((4, 4)), np.zeros((1, 4)))
@@ -70,6 +71,27 @@ def test_a_sliver_beside_a_change_is_made_one_with_it_and_a_change_of_nothing_go
     log = noisy(picking, np.random.default_rng(1))
     found = kept(log, (1.55, 1.75, 2.3, 3.0), (0.0, 0.08, 0.05, 0.05, 0.0))
     assert [one.time for one in found] == pytest.approx([1.5, 3.0], abs=0.05)
+
+
+def test_nothing_is_carried_for_less_than_a_fifth_of_a_second() -> None:
+    """Whatever a jolt explains of the rows."""
+    recording = Acquisition(duration=4.5)
+    schedule = [(1.5, 0.4), (1.62, 0.2), (3.0, 0.0)]
+    (log,) = synthesise(CASE, excitation(CASE, "wide"), recording, schedule=schedule)
+    noise = np.random.default_rng(5)
+    found = kept(noisy(log, noise), (1.5, 1.62, 3.0), (0.0, 0.4, 0.2, 0.0))
+    assert [one.time for one in found] == pytest.approx([1.5, 3.0], abs=0.1)
+
+
+def test_a_change_in_a_hole_is_left_where_cells_have_it(picking: Log) -> None:
+    """Rows on one side of it show none."""
+    log = noisy(picking, np.random.default_rng(6))
+    sides = [log.part(0, 1400), log.part(1800, len(log))]
+    (hidden, told) = confirmed(
+        lambda: segments(sides), ARM, STEADY, (0.0, 4.5), 1.0, rough(1.8, 3.0), (0.0, 0.05, 0.0)
+    )
+    assert (hidden.time, hidden.bracket) == (1.8, (1.8, 1.8))
+    assert told.time == pytest.approx(3.0, abs=0.05)
 
 
 def test_rows_do_not_depend_on_how_a_log_was_cut(picking: Log) -> None:
