@@ -128,10 +128,6 @@ def _without_metadata(log: Flat) -> None:
         raise CannotSayError
 
 
-def _kinds(log: Flat) -> set[str]:
-    return {np.asarray(one).dtype.kind for one in log.columns.values()}
-
-
 def cell_text(value: Any) -> str:
     """A cell as text files write it."""
     if value is None:
@@ -250,40 +246,27 @@ def _table(way: str, folder: Path, log: Flat) -> Path:
     return store_table(folder / f"log.{way}", arrow_table(log))
 
 
-def _npz(folder: Path, log: Flat) -> Path:
-    if "O" in _kinds(log):
-        raise CannotSayError
-    arrays = {name: np.asarray(values) for name, values in log.columns.items()}
-    arrays |= {key: np.array(value) for key, value in log.metadata.items()}
-    for key in {key for said in log.attributes.values() for key in said}:
-        by_place = [log.attributes.get(name, {}).get(key, "") for name in log.columns]
-        arrays[key] = np.array(by_place)
-    return store(folder / "log.npz", arrays)
-
-
-def _mat(folder: Path, log: Flat) -> Path:
-    if _kinds(log) & set("OmM") or not all(map(str.isidentifier, log.columns)):
-        raise CannotSayError
+def _stored(way: str, folder: Path, log: Flat) -> Path:
+    """Arrays and their attributes, by place in NumPy's archives, by name in MATLAB's structs."""
     content: dict[str, Any] = {name: np.asarray(values) for name, values in log.columns.items()}
+    kinds = {one.dtype.kind for one in content.values()}
+    nameless = way == "mat" and not all(map(str.isidentifier, content))
+    if nameless or kinds & set("O" if way == "npz" else "OmM"):
+        raise CannotSayError
+    path = folder / f"log.{way}"
+    if way == "h5":
+        texts = {name: one.astype("S") for name, one in content.items() if one.dtype.kind == "U"}
+        with h5py.File(store(path, content | texts), "a") as file:
+            for name, said in log.attributes.items():
+                for key, text in said.items():
+                    file[name].attrs[key] = text if key == "units" else float(text)
+            file.attrs.update(log.metadata)
+        return path
     content |= log.metadata
     for key in {key for said in log.attributes.values() for key in said}:
-        by_name = {name: said[key] for name, said in log.attributes.items() if key in said}
-        content[key] = by_name
-    return store(folder / "log.mat", content)
-
-
-def _h5(folder: Path, log: Flat) -> Path:
-    if _kinds(log) & set("OmM"):
-        raise CannotSayError
-    arrays = {name: np.asarray(values) for name, values in log.columns.items()}
-    texts = {name: one.astype("S") for name, one in arrays.items() if one.dtype.kind == "U"}
-    path = store(folder / "log.h5", arrays | texts)
-    with h5py.File(path, "a") as file:
-        for name, said in log.attributes.items():
-            for key, text in said.items():
-                file[name].attrs[key] = text if key == "units" else float(text)
-        file.attrs.update(log.metadata)
-    return path
+        named = {name: said[key] for name, said in log.attributes.items() if key in said}
+        content[key] = named if way == "mat" else [named.get(name, "") for name in log.columns]
+    return store(path, content)
 
 
 def _dict(_: Path, log: Flat) -> dict[str, Any]:
@@ -336,7 +319,8 @@ def _json_columns(folder: Path, log: Flat) -> Path:
 _FLAT_WAYS: dict[str, Callable[[Path, Flat], Any]] = {
     "csv": partial(_text, "csv"), "tsv": partial(_text, "tsv"), "jsonl": _jsonl,
     "parquet": partial(_table, "parquet"), "feather": partial(_table, "feather"),
-    "npz": _npz, "mat": _mat, "h5": _h5, "dict": _dict, "pandas": _pandas,
+    "npz": partial(_stored, "npz"),
+    "mat": partial(_stored, "mat"), "h5": partial(_stored, "h5"), "dict": _dict, "pandas": _pandas,
     "polars": _polars, "arrays": _arrays, "json": _json_columns,
 }  # fmt: skip
 
