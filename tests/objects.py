@@ -1,6 +1,4 @@
-"""A local server that speaks S3 and counts what it hands out, and a log with cameras beside the
-joints.
-"""
+"""A local server that speaks S3."""
 
 from __future__ import annotations
 
@@ -23,7 +21,7 @@ DENIED = (
 
 @dataclass
 class Served:
-    """A bucket of its own, the query behind an S3 URL, and the bytes that each answer to a GET had.
+    """A bucket of its own, and the query behind an S3 URL.
 
     `asked` has the method, path and authorization of each request, `denied` says which are
     answered by 403, and `after` is called once a GET of a path is answered.
@@ -31,7 +29,6 @@ class Served:
 
     bucket: str
     query: str
-    answers: list[int] = field(default_factory=list)
     asked: list[tuple[str, str, str]] = field(default_factory=list)
     denied: Callable[[str, str], bool] = lambda _method, _path: False
     after: Callable[[str], None] = lambda _path: None
@@ -46,10 +43,10 @@ class Served:
 
         get_backend("s3")["123456789012"]["aws"].put_object(self.bucket, name, content)
 
-    def counting(self, app: Callable[..., Iterable[bytes]]) -> Callable[..., Iterable[bytes]]:
-        """The application, its answers counted."""
+    def watched(self, app: Callable[..., Iterable[bytes]]) -> Callable[..., Iterable[bytes]]:
+        """The application, its requests noted."""
 
-        def counted(environ: dict[str, Any], start: Any) -> list[bytes]:
+        def answer(environ: dict[str, Any], start: Any) -> list[bytes]:
             method, path = (
                 environ["REQUEST_METHOD"],
                 environ["PATH_INFO"].encode("latin-1").decode(),
@@ -60,11 +57,10 @@ class Served:
                 return [] if method == "HEAD" else [DENIED]
             content = list(app(environ, start))
             if method == "GET":
-                self.answers.append(sum(map(len, content)))
                 self.after(path)
             return content
 
-        return counted
+        return answer
 
 
 @contextmanager
@@ -87,7 +83,7 @@ def s3(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
         f"lab-{uuid.uuid4().hex}",
         f"?scheme=http&endpoint_override={place}&region=us-east-1&allow_bucket_creation=true",
     )
-    running._server.app = served.counting(running._server.app)
+    running._server.app = served.watched(running._server.app)
     try:
         connect(served.url(""))[0].create_dir(served.bucket)
         yield served

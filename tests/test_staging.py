@@ -13,6 +13,8 @@ import threading
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -34,24 +36,13 @@ with makes[sys.argv[1]](Path(sys.argv[2])) as temporary, temporary_folder():
 ROOT = str(Path(staging.__file__).parents[1])
 
 
-def _without_exchange(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As with a file system that cannot exchange two names."""
-
-    class Library:
-        @staticmethod
-        def renameat2(*_arguments: object) -> int:
-            ctypes.set_errno(errno.EINVAL)
-            return -1
-
-    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: Library)
+LIBRARIES = [ctypes.CDLL(None), SimpleNamespace(renameat2=lambda *_: -1), object()]
 
 
-def _without_renameat2(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: object())
-
-
-Prepare = Callable[[pytest.MonkeyPatch], None]
-SYSTEMS: list[Prepare] = [lambda _patch: None, _without_exchange, _without_renameat2]
+@pytest.fixture(params=LIBRARIES, ids=["this system", "no exchange of names", "not Linux"])
+def system(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The library of a system that may be unable to exchange two names."""
+    monkeypatch.setattr(ctypes, "CDLL", lambda _: request.param)
 
 
 def _kill_while_making(*arguments: str | Path) -> None:
@@ -97,53 +88,39 @@ def test_folders_of_a_users_own_names_are_not_swept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    names = [
-        "algid-results",
-        "algid-1234abcd",
-        ".a.algid.notes",
-        ".a.algid-backup",
-        ".a.algid-0123abcde",
-    ]
+    names = ["algid-1234abcd", ".a.algid-backup", ".a.algid-0123abcde"]
     for name in names:
         (tmp_path / name).mkdir()
-        os.utime(tmp_path / name, (0, 0))
     with temporary_folder(), whole_folder(tmp_path / "a", force=False):
         delete_leftovers(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*names, "a"])
 
 
-@pytest.mark.parametrize("prepare", SYSTEMS)
+@pytest.mark.usefixtures("system")
+@pytest.mark.parametrize(("whole", "below"), [(whole_folder, "result.json"), (whole_file, "")])
 def test_of_two_writers_the_second_is_refused_and_with_force_the_last_one_stands(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, prepare: Prepare
+    tmp_path: Path, whole: Callable[..., Any], below: str
 ) -> None:
-    prepare(monkeypatch)
     path = tmp_path / "a"
-    with ExitStack() as stack:
-        late = stack.enter_context(whole_folder(path, force=False))
-        (late / "mine").touch()
-        with whole_folder(path, force=False) as early:
-            (early / "theirs").touch()
-        with pytest.raises(OutputError, match=r"/a: exists already; choose another folder"):
-            stack.close()
-    assert [found.name for found in path.iterdir()] == ["theirs"]
-    with whole_folder(path, force=True) as late:
-        (late / "mine").touch()
-        with whole_folder(path, force=True) as early:
-            (early / "again").touch()
-        assert [found.name for found in path.iterdir()] == ["again"]
-    assert [found.name for found in path.iterdir()] == ["mine"]
-    assert [found.name for found in tmp_path.iterdir()] == ["a"]
+    for force, last in ((False, "early"), (True, "late")):
+        with ExitStack() as stack:
+            late = stack.enter_context(whole(path, force=force))
+            (late / below).write_text("late")
+            with whole(path, force=force) as early:
+                (early / below).write_text("early")
+            assert (path / below).read_text() == "early"
+            if not force:
+                with pytest.raises(OutputError, match="/a: exists already; choose another folder"):
+                    stack.close()
+        assert (path / below).read_text() == last
+    assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.usefixtures("system")
 @pytest.mark.parametrize("kind", ["file", "link", "dangling link", "empty folder"])
-@pytest.mark.parametrize("prepare", SYSTEMS)
 def test_whatever_stands_there_is_replaced_by_force_alone_and_links_are_not_followed(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    prepare: Prepare,
-    kind: str,
+    tmp_path: Path, kind: str
 ) -> None:
-    prepare(monkeypatch)
     path, other = tmp_path / "a", tmp_path / "other"
     other.mkdir()
     (other / "kept").touch()
@@ -216,23 +193,8 @@ def test_what_the_system_says_is_told_whoever_raises_it(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("prepare", SYSTEMS)
-def test_of_two_writers_of_a_file_the_second_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, prepare: Prepare
-) -> None:
-    prepare(monkeypatch)
-    path = tmp_path / "a.csv"
-    with ExitStack() as stack:
-        early = stack.enter_context(whole_file(path, force=False))
-        early.write_text("early")
-        with whole_file(path, force=False) as late:
-            late.write_text("late")
-        with pytest.raises(OutputError, match=r"/a\.csv: exists already; choose another"):
-            stack.close()
-    assert path.read_text() == "late"
-    with pytest.raises(OutputError, match="exists already"), whole_file(path, force=False):
+def test_a_file_takes_no_folders_place(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    with pytest.raises(OutputError, match=r"/a: cannot write \("), whole_file(tmp_path / "a"):
         pass
-    with whole_file(path) as again:
-        again.write_text("again")
-    assert path.read_text() == "again"
-    assert [found.name for found in tmp_path.iterdir()] == ["a.csv"]
+    assert list(tmp_path.iterdir()) == [tmp_path / "a"]

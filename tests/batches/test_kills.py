@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -162,59 +161,6 @@ def test_a_stop_ends_at_once_even_where_a_job_hangs_and_keeps_what_is_finished(
     assert "1 ok; 1 run now, 1 left" in told
     assert pl.read_parquet(tmp_path / "out/jobs.parquet")["job"].to_list() == ["d0"]
     assert left(tmp_path / "out") == []
-
-
-def test_a_job_past_its_time_fails_alone(tmp_path: Path) -> None:
-    log, out = tmp_path / "logs/hangs.csv", tmp_path / "out"
-    log.parent.mkdir()
-    log.write_text("t,theta1,theta2,tau1,tau2\n")
-    (tmp_path / "sitecustomize.py").write_text(HANGING)
-    running = _start(log.parent, out, "--workers", "1", "--timeout", "0.5", site=tmp_path)
-    told, errors = running.communicate(timeout=120)
-    assert (running.returncode, errors) == (1, "")
-    assert told.startswith(
-        "hangs: failed: it took longer than 0.5 s; raise --timeout, and run it again with --retry-"
-    )
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A file system of 64 kB; skips where none may be mounted."""
-    place = tmp_path / "disk"
-    place.mkdir()
-    if not _mounts("-t", "tmpfs", "-o", "size=64k", "tmpfs", str(place)):
-        pytest.skip("no small file system can be mounted here")
-    yield place
-    subprocess.run(["umount", str(place)], check=True)
-
-
-def _mounts(*flags: str) -> bool:
-    try:
-        return subprocess.run(["mount", *flags], capture_output=True, check=False).returncode == 0
-    except OSError:
-        return False
-
-
-def test_a_full_disk_stops_a_batch_that_ends_as_undisturbed_once_there_is_room(
-    logs: Path, small_disk: Path, undisturbed: Undisturbed
-) -> None:
-    out = small_disk / "out"
-    first = _start(logs, out)
-    told, errors = first.communicate()
-    assert first.returncode == 1
-    assert "No space left on device" in errors
-    assert "make room and run again" in errors
-    assert "Traceback" not in errors
-    finished = [path.parent.stem for path in out.rglob("result.json")]
-    assert 0 < len(finished) < JOBS
-    assert "failed" not in told
-    assert left(out) == []
-    assert _mounts("-o", "remount,size=16m", str(small_disk))
-    second = _start(logs, out)
-    told, errors = second.communicate()
-    assert (second.returncode, errors) == (0, "")
-    assert f"{JOBS} ok" in told
-    assert _digest(out) == undisturbed.digest
 
 
 @pytest.mark.parametrize("victim", ["worker", "batch", "scheduler"])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import signal
 import socket
 import subprocess
@@ -17,7 +16,7 @@ from algid.base.errors import SettingError
 from algid.batches.cluster import cluster
 from algid.batches.workers import CallFailedError, WorkerDiedError, Workers
 from tests.batches import calls
-from tests.batches.commands import ROOT, start, wait_until
+from tests.batches.commands import ROOT, wait_until
 from tests.test_guard import lives
 
 
@@ -157,24 +156,19 @@ def test_workers_start_from_any_thread_import_no_main_and_die_with_their_parent(
     wait_until(lambda: not lives(int(told.read_text())))
 
 
-@pytest.mark.parametrize("address", ["", "inproc://a"])
-def test_what_is_no_address_of_a_scheduler_is_refused_at_once(address: str) -> None:
+@pytest.mark.parametrize("address", ["", "inproc://a", "tcp://127.0.0.1:{}"])
+def test_what_is_no_scheduler_is_refused_in_a_line(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pytest.importorskip("distributed", reason="distributed is absent")
-    with (
-        pytest.raises(
-            SettingError, match=r"^--scheduler .*: no scheduler answers \(.*; start dask scheduler$"
-        ),
-        cluster(address, None, None),
-    ):
-        pass
+    monkeypatch.setattr("algid.batches.cluster.SECONDS", 0.5)
+    told = r"^--scheduler .*: no scheduler answers \(.+\); start dask scheduler$"
+    with socket.create_server(("127.0.0.1", 0)) as silent, pytest.raises(SettingError, match=told):
+        cluster(address.format(silent.getsockname()[1]), None, None).__enter__()
 
 
-@pytest.mark.slow
-def test_a_scheduler_that_says_nothing_gets_one_line(tmp_path: Path) -> None:
-    pytest.importorskip("distributed", reason="distributed is absent")
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
-        running = start("batch", __file__, "-o", tmp_path / "out", "--scheduler", address)
-        told, errors = running.communicate(timeout=60)
-    assert (running.returncode, told) == (2, "")
-    assert re.fullmatch(rf"algid: --scheduler {address}: no scheduler answers \(.+\); .*\n", errors)
+def test_a_call_that_takes_too_long_ends_alone() -> None:
+    with Workers(1, timeout=0.5) as executor:
+        with pytest.raises(CallFailedError, match=r"longer than 0\.5 s; raise --timeout, and run"):
+            executor.submit(calls.spin).result()
+        assert executor.submit(calls.add, 1, 1).result() == 2
