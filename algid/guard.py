@@ -178,12 +178,10 @@ def supervise(command: Callable[[], int]) -> tuple[int, str | None]:
     """
     listening, telling = os.pipe()
     parent = os.getpid()
-    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)  # none comes before there is who hears it
     child = os.fork()
     if child == 0:
         os.close(listening)
         begin(lambda note: os.write(telling, os.fsencode(note) + b"\0"), parent)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
         return command(), None
     os.close(telling)
     stops: list[tuple[int, float]] = []
@@ -199,7 +197,6 @@ def supervise(command: Callable[[], int]) -> tuple[int, str | None]:
     for number in _ENDING:  # nohup has a process ignore SIGHUP
         if number in (signal.SIGINT, signal.SIGTERM) or not signal.getsignal(number):
             signal.signal(number, stop)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
     notes, rest = Notes(), b""
     while content := os.read(listening, 1 << 16):
         *told, rest = (rest + content).split(b"\0")

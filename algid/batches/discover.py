@@ -18,7 +18,7 @@ from urllib.parse import unquote
 
 from algid.base.errors import SettingError
 from algid.base.stores import is_url, list_urls, shown
-from algid.batches.jobs import TABLE, Job, name_fault, redacted_path, safe_name
+from algid.batches.jobs import TABLE, Job, fit_name, redacted_path, safe_name
 from algid.batches.manifest import is_manifest, read_manifest
 from algid.readers.formats import SUFFIXES
 
@@ -143,9 +143,10 @@ def _job_of(path: str, name: str, trouble: str | None, alone: str) -> Job:
     """The job of one log; one whose name is unfit stands under another."""
     match = _NAME.fullmatch(name)
     name, role = match.groups(alone) if match else (name, alone)
-    fault = name_fault(name)
-    if fault and not trouble:
-        trouble = f"{redacted_path(path)}: a log's name becomes a folder's: {fault}; rename it"
+    try:
+        fit_name(name)
+    except ValueError as error:
+        trouble = trouble or f"{redacted_path(path)}: {error}; rename it"
     if trouble:
         return Job(safe_name(name), logs=(path,), trouble=trouble)
     logs, loaded = ((), (path,)) if role == "loaded" else ((path,), ())

@@ -74,20 +74,25 @@ class Job:
     trouble: str | None = None
 
 
-def name_fault(name: str) -> str | None:
-    """Why no result and no record of that name can lie in OUT beside all others.
+def fit_name(name: str) -> str:
+    """The name of a job, whose result and record can lie in OUT beside all others.
 
-    None where they can.
+    Raises
+    ------
+    ValueError
+        If they cannot.
     """
     *folders, _ = parts = name.split("/")
     sizes = [len(part.encode(errors="surrogatepass")) for part in parts]
     odd = not name.isprintable() or "\\" in name or "/." in f"/{name}"
-    if odd or min(sizes) == 0 or max(sizes) > 200:
-        return "expected parts of 1 to 200 printable characters, none starting with a dot"
-    if sum(sizes) > LIMITS.name_bytes or any(one.lower().endswith(_TAKEN) for one in folders):
-        own = " or ".join(_TAKEN)
-        return f"expected at most {LIMITS.name_bytes} bytes, and no folder that ends in {own}"
-    return None
+    taken = any(folder.lower().endswith(_TAKEN) for folder in folders)
+    if odd or taken or not 0 < min(sizes) <= max(sizes) <= 200 or sum(sizes) > LIMITS.name_bytes:
+        raise ValueError(
+            "a job's name becomes a folder's: expected parts of 1 to 200 printable characters, "
+            f"{LIMITS.name_bytes} bytes in all, none starting with a dot, no folder that ends in "
+            f"{' or '.join(_TAKEN)}"
+        )
+    return name
 
 
 def safe_name(name: str) -> str:

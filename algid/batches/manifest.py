@@ -31,7 +31,7 @@ from algid.base.errors import SettingError
 from algid.base.files import first_misfit, read_start, read_text, toml_content
 from algid.base.limits import LIMITS
 from algid.base.text import repeated, visible
-from algid.batches.jobs import Job, Label, Time, name_fault
+from algid.batches.jobs import Job, Label, Time, fit_name
 
 
 def is_manifest(path: Path) -> bool:
@@ -108,12 +108,6 @@ def label_of(value: object) -> Label:
     raise ValueError("expected text, a date, true, false or a number below 2^63")
 
 
-def _name(name: str) -> str:
-    if fault := name_fault(name):
-        raise ValueError(f"a job's name becomes a folder's: {fault}")
-    return name
-
-
 def _placed(path: str, manifest: ValidationInfo) -> str:
     """A path of a manifest as seen from its folder."""
     path = path.strip()
@@ -134,7 +128,7 @@ class _Row(BaseModel, extra="allow", coerce_numbers_to_str=True):
     """A job as a manifest states it; what stands beside its fields is a label."""
 
     __pydantic_extra__: dict[str, Annotated[Any, BeforeValidator(label_of)]] = Field(init=False)
-    name: Annotated[str, AfterValidator(_name)]
+    name: Annotated[str, AfterValidator(fit_name)]
     logs: _Paths = []
     loaded: _Paths = []
     profile: _Path | None = None

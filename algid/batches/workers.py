@@ -154,10 +154,9 @@ def serve() -> None:
         call = pipe.recv_bytes()
         try:
             fn, args = pickle.loads(call)
-            answer = True, fn(*args)
+            send((True, fn(*args)))
         except BaseException as error:  # whatever a call raises becomes words
-            answer = False, text_of(error)
-        send(answer)
+            send((False, text_of(error)))
 
 
 if __name__ == "__main__":

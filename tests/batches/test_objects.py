@@ -144,23 +144,12 @@ def test_credentials_in_a_url_open_everything_below_it_and_are_kept_nowhere(
     assert _run(served, user="OTHER:KEYS@", report=True).ran == 0
 
 
-@pytest.mark.parametrize(
-    ("source", "out", "code"),
-    [
-        pytest.param("lab/logs", "lab/out", 1, marks=pytest.mark.slow),
-        ("lab/empty", "lab/out", 2),
-        ("lab/logs", "no-such-lab/out", 2),
-    ],
-)
-def test_credentials_are_not_printed(served: Served, source: str, out: str, code: int) -> None:
+@pytest.mark.parametrize(("source", "code"), [("logs", 1), ("empty", 2)])
+def test_credentials_are_not_printed(served: Served, source: str, code: int) -> None:
     open_store(served.url("logs")).write("bad.csv", b"junk")
-    urls = (
-        f"s3://{USER}{place}{served.query}".replace("@lab/", f"@{served.bucket}/")
-        for place in (source, out)
-    )
-    done = Outcome("batch", next(urls), "-o", next(urls), "--workers", "1")
+    urls = served.url(source, USER), "-o", served.url("out", USER)
+    done = Outcome("batch", *urls, "--workers", "1")
     assert done.code == code, done.err
-    assert done.out or done.err
     for word in ("Traceback", KEY, SECRET):
         assert word not in done.out + done.err
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import nullcontext
@@ -239,6 +240,17 @@ def test_a_watch_takes_logs_once_they_stay_as_they_are_and_tells_a_trouble_once(
     assert set(table["job"]) == {*found, "growing"}
     assert "as asked" in table["reason"].to_list()
     assert told == ["away"]
+
+
+def test_a_watch_ends_by_a_signal_with_what_is_finished(
+    logs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ending = Here(lambda _name: os.kill(os.getpid(), signal.SIGTERM))
+    monkeypatch.setattr("algid.batches.workers.Workers", lambda *_: nullcontext(ending))
+    monkeypatch.setattr("algid.batches.run.LOOK_EVERY", 0.0)
+    done = algid.batch(logs, logs.parent / "out", workers=1, watch=True, **QUICK)
+    assert (done.ran > 0, done.interrupted, done.stopped) == (True, False, None)
+    assert pl.read_parquet(logs.parent / "out/jobs.parquet").height == done.ran
 
 
 def test_a_job_whose_logs_cannot_be_looked_at_fails_this_time_and_keeps_its_row(
