@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 from algid.arm import FloatArray
@@ -46,20 +45,6 @@ def test_corners_between_and_on_samples_are_met() -> None:
     np.testing.assert_allclose(
         states[0], (spans**2 / 2 + spans * np.maximum(after, 0)) @ levels, atol=1e-13
     )
-
-
-def test_a_stiff_damper_agrees_with_an_implicit_integrator() -> None:
-    def damped(times: FloatArray, theta: FloatArray, omega: FloatArray) -> FloatArray:
-        return 40 * np.sin(9 * times) - 900 * omega - 50 * theta**3
-
-    t = np.linspace(0, 2, 21)
-    states = integrate(at(damped), np.array([1.0, 30.0]), t)
-
-    def rate(now: float, y: FloatArray) -> list[float]:
-        return [y[1], float(40 * np.sin(9 * now) - 900 * y[1] - 50 * y[0] ** 3)]
-
-    other = solve_ivp(rate, (0, 2), [1.0, 30.0], method="LSODA", t_eval=t, rtol=1e-12, atol=1e-13).y
-    np.testing.assert_allclose(states, other, atol=1e-8)
 
 
 def test_a_motion_without_bound_is_refused_before_it_gets_there() -> None:

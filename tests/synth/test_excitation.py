@@ -12,7 +12,7 @@ import pytest
 
 from algid.arm import Arm, inverse_dynamics
 from algid.base.errors import SettingError
-from algid.synth.cases import case_names, load_case
+from algid.synth.cases import load_case
 from algid.synth.excitation import Hold, SampledTorque, wide_multi_sine
 
 
@@ -29,46 +29,6 @@ def test_a_sampled_torque_is_held_or_joined(
     found = torque(np.array([-1.0, 0.0, 0.5, 1.0 - 1e-12, 1.0, 3.0, 9.0]))
     expected = np.array([[1, -2], [1, -2], between, just_before, [3, 2], [5, 4], [5, 4]]).T
     np.testing.assert_allclose(found, expected, atol=1e-11)
-
-
-def test_the_cases_are_those_of_table_3() -> None:
-    assert case_names() == ["case1", "case2"]
-    expected = {
-        "case1": (
-            0.3674,
-            0.0814,
-            0.0813,
-            0.0616,
-            0.1626,
-            0.1232,
-            0.0009,
-            0.0018,
-            0.1360,
-            0.3072,
-            9.81,
-        ),
-        "case2": (
-            0.4274,
-            0.1077,
-            0.1213,
-            0.0857,
-            0.1925,
-            0.1433,
-            0.0011,
-            0.0022,
-            0.1570,
-            0.3392,
-            9.81,
-        ),
-    }
-    for name, values in expected.items():
-        case = load_case(name)
-        assert case.arm == Arm(*values)
-        assert case.payload == {"case1": 0.3515, "case2": 0.6315}[name]
-        assert set(
-            map(len, (*case.torque.amplitude, *case.torque.frequency, *case.torque.phase))
-        ) == {4}
-        assert case.paper_error_percent["m_p"] > 0
 
 
 def test_a_file_of_lengths_and_masses_is_an_arm_of_uniform_links(tmp_path: Path) -> None:

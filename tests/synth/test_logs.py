@@ -4,18 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from algid.base.errors import AlgidError
-from algid.readers import read_log
 from tests.cli.commands import app
-
-BARE = "[arm]\nm1 = 2.0\nm2 = 1.0\nl1 = 0.4\nl2 = 0.3\nb1 = 0.2\nb2 = 0.1\n"
-PLAN = "t,theta1,theta2,omega1,omega2,tau1,tau2\n" + "".join(
-    f"{t},-1.57,0,0,0,0,0\n" for t in (0, 0.01, 0.02, 0.03)
-)
 
 
 def synth(*arguments: object) -> tuple[int, str]:
@@ -23,46 +16,6 @@ def synth(*arguments: object) -> tuple[int, str]:
     if isinstance(done.exception, AlgidError):  # the entry point prints it and exits with 2
         return 2, str(done.exception)
     return done.exit_code, done.output
-
-
-def test_an_arm_without_payload_leaves_one_log_with_the_noise_of_its_seed(tmp_path: Path) -> None:
-    case, logs = tmp_path / "bare.toml", tmp_path / "logs"
-    case.write_text(BARE, encoding="utf-8")
-    code, said = synth(
-        case, "--torque-noise", "0.1", "--duration", "0.1", "--format", "csv", "-o", logs
-    )
-    assert (code, said.split()) == (0, [str(logs / "bare-unloaded.csv")])
-    case.write_text(BARE + "[payload]\nm_p = 0.3\n", encoding="utf-8")
-    synth(
-        case,
-        "--torque-noise",
-        "0.1",
-        "--duration",
-        "0.1",
-        "--format",
-        "csv",
-        "-o",
-        tmp_path / "both",
-    )
-    once, both = (
-        read_log(folder / "bare-unloaded.csv").tau for folder in (logs, tmp_path / "both")
-    )
-    np.testing.assert_array_equal(once, both)
-
-
-def test_a_rehearsal_overwrites_no_log_either(tmp_path: Path) -> None:
-    case, plan = tmp_path / "bare.toml", tmp_path / "plan.csv"
-    case.write_text(BARE, encoding="utf-8")
-    plan.write_text(PLAN, encoding="utf-8")
-    arguments = (case, "--motion", plan, "--format", "csv", "-o", tmp_path)
-    assert synth(*arguments)[0] == 0
-    before = (tmp_path / "bare-unloaded.csv").read_bytes()
-    code, said = synth(*arguments, "--torque-noise", "0.1")
-    assert code == 2
-    assert f"{tmp_path / 'bare-unloaded.csv'}: exists already" in said
-    assert (tmp_path / "bare-unloaded.csv").read_bytes() == before
-    assert synth(*arguments, "--torque-noise", "0.1", "--force")[0] == 0
-    assert (tmp_path / "bare-unloaded.csv").read_bytes() != before
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import binom, chi2, kstest
+from scipy.stats import binom, chi2
 
 from algid.arm import FloatArray
 from algid.log import Truth
@@ -50,11 +50,9 @@ def test_noise_has_the_standard_deviation_asked_for_and_no_memory(
         low, high = chi2.ppf([RARE / 2, 1 - RARE / 2], COUNT)
         for row in error / std:
             assert low < row @ row < high
-            assert kstest(row, "norm").pvalue > RARE
-        # products of neighbours, and of both joints, have mean 0 and variance 1
-        products = (error[:, 1:] * error[:, :-1]).ravel(), error[0] * error[1]
-        for product in products:
-            assert abs(product.sum()) < 5 * std**2 * np.sqrt(product.size)
+        # products of neighbours have mean 0 and variance 1
+        product = error[:, 1:] * error[:, :-1]
+        assert abs(product.sum()) < 5 * std**2 * np.sqrt(product.size)
 
 
 @pytest.mark.parametrize("bits", [4, 12, 20])
@@ -67,11 +65,6 @@ def test_an_encoder_rounds_to_the_nearest_of_its_lines(bits: int) -> None:
     assert np.abs(error).max() <= 0.5 + 1e-9
     assert omega is None
     np.testing.assert_array_equal(tau, motion().tau)
-    # fine lines: the error is uniform, of variance a twelfth, whose square has variance 1 / 180
-    if bits == 20:
-        squares = error**2
-        assert abs(squares.mean() - 1 / 12) < 5 * np.sqrt(1 / 180 / squares.size)
-        assert abs(error.mean()) < 5 * np.sqrt(1 / 12 / error.size)
 
 
 def test_jitter_is_as_large_as_asked_and_keeps_the_order() -> None:
@@ -95,5 +88,3 @@ def test_as_many_samples_are_lost_as_asked_but_not_the_ends(share: float) -> Non
     assert (t[0], t[-1]) == (0.0, 20.0)
     places = np.round(1000 * t).astype(int)
     np.testing.assert_allclose(t, places / 1000, atol=1e-9)
-    lost = np.diff(places) > 1  # at random: what is lost does not tell whether the next is
-    assert abs(lost.mean() - share) < 5 * np.sqrt(share * (1 - share) / lost.size)
