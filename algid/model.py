@@ -595,25 +595,21 @@ def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
         By order of θ's derivative, torque's joint and angle's joint. Where a load is nothing its
         sign is too.
     """
-    compiled, c = model.compiled, apart(model, c)
+    compiled, own = model.compiled, apart(model, c)
     values = Values(motion, model.shape)
     P = np.empty((3, 2, 2, motion.theta.shape[1]))
     for where, weighted in compiled.partials.items():
-        P[where] = summed(weighted, c, values)
+        P[where] = summed(weighted, own, values)
     for name, joint in attributes(model, "by_load"):
-        share, sign = c[compiled.place[name]], smooth_sign(model, motion.omega[joint])
-        load, loads = np.zeros(P.shape[-1]), compiled.loads
-        for row, place, entry in compiled.regressor:
-            if row == joint and place in loads:
-                load += c[place] * values.sum(entry)
+        share, sign = own[compiled.place[name]], smooth_sign(model, motion.omega[joint])
+        carried = load(model, c, motion)[joint]
         for order in range(3):
             for angle in range(2):
-                by_load = summed(
-                    compiled.only(compiled.partials[order, joint, angle], loads), c, values
-                )
-                P[order, joint, angle] += share * sign * np.sign(load) * by_load
-        P[1, joint, joint] += share * np.abs(load) * (1 - sign**2) / model.coulomb_speed
-    factor = gains(model, c)
+                of_load = compiled.only(compiled.partials[order, joint, angle], compiled.loads)
+                slope = summed(of_load, own, values)
+                P[order, joint, angle] += share * sign * np.sign(carried) * slope
+        P[1, joint, joint] += share * np.abs(carried) * (1 - sign**2) / model.coulomb_speed
+    factor = gains(model, own)
     for joint in range(2):
         if np.any(factor[joint] != 1):
             P[:, joint] *= factor[joint]

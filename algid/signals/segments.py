@@ -20,6 +20,7 @@ from algid.base.criteria import CUT
 from algid.log import SIGNALS, IntArray, Log, join, joined, usual_period
 from algid.signals.spacing import signals_of, spaced
 
+_ENDLESS = 1 << 62  # samples: more than any stretch has
 PERIOD_SAMPLES = 4096  # the first samples, from which the period is taken
 EVEN = 1e-3  # periods: stamps this close to the time base are taken as lying on it
 
@@ -87,7 +88,8 @@ def segments(blocks: Iterable[Log]) -> Iterator[Segment]:
     if not first:
         return
     head = join(first)  # so that the period does not depend on how the blocks were cut
-    stamps = _first_stamps(spaced([head], usual_period(head.stamp_ns[:PERIOD_SAMPLES])))
+    even = spaced([head], usual_period(head.stamp_ns[:PERIOD_SAMPLES]))
+    stamps = np.concatenate([log.stamp_ns for log in even])[:PERIOD_SAMPLES]
     steps, dt = np.diff(stamps).astype(np.float64), usual_period(stamps)
     near = steps[np.abs(steps - 1e9 * dt) <= 0.5e9 * dt]
     if 2 * near.size > steps.size:
@@ -97,23 +99,7 @@ def segments(blocks: Iterable[Log]) -> Iterator[Segment]:
 
 def stretches(blocks: Iterable[Log]) -> list[Segment]:
     """The same segments, each with those that continue it: one from gap to gap."""
-    whole: list[Segment] = []
-    for segment in segments(blocks):
-        if segment.continues and whole:
-            whole[-1] = append(whole[-1], segment)
-        else:
-            whole.append(segment)
-    return whole
-
-
-def _first_stamps(blocks: Iterable[Log]) -> IntArray:
-    """The first `PERIOD_SAMPLES` stamps; the other signals are not copied."""
-    stamps: list[IntArray] = []
-    for block in blocks:
-        stamps.append(block.stamp_ns)
-        if sum(map(len, stamps)) >= PERIOD_SAMPLES:
-            break
-    return np.concatenate(stamps)[:PERIOD_SAMPLES]
+    return list(pieces(segments(blocks), _ENDLESS))
 
 
 def _resampled(blocks: Iterable[Log], origin_ns: int, dt: float) -> Iterator[Segment]:

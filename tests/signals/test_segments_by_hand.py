@@ -12,7 +12,7 @@ import pytest
 from scipy.interpolate import BarycentricInterpolator
 
 from algid.log import Log, Origin
-from algid.signals.segments import Segment, append, pieces, segments
+from algid.signals.segments import Segment, pieces, segments, stretches
 
 MS = 1_000_000  # ns
 
@@ -29,13 +29,7 @@ def log_at(ms: list[float], *, omega: bool = False) -> Log:
 
 def found(log: Log | list[float], *, omega: bool = False) -> list[Segment]:
     """The stretches, each joined to one segment."""
-    whole: list[Segment] = []
-    for part in segments([log if isinstance(log, Log) else log_at(log, omega=omega)]):
-        if part.continues:
-            whole[-1] = append(whole[-1], part)
-        else:
-            whole.append(part)
-    return whole
+    return stretches([log if isinstance(log, Log) else log_at(log, omega=omega)])
 
 
 def test_a_log_without_samples_has_no_segments() -> None:
@@ -106,7 +100,7 @@ def test_the_period_is_the_mean_of_the_steps_near_the_usual_one() -> None:
     assert whole.dt == pytest.approx(1.05e-3, rel=1e-9)
 
 
-def stretches(lengths: list[list[int]]) -> Iterator[Segment]:
+def of_lengths(lengths: list[list[int]]) -> Iterator[Segment]:
     """Stretches given as the lengths of the segments they come in.
 
     a sample's value is its number in all.
@@ -137,7 +131,7 @@ def test_pieces_have_the_lengths_that_they_promise(
     lengths: list[list[int]], expected: list[list[int]]
 ) -> None:
     cut: list[list[int]] = []
-    for piece in pieces(stretches(lengths), 10):
+    for piece in pieces(of_lengths(lengths), 10):
         if piece.continues:
             cut[-1].append(len(piece))
         else:
