@@ -232,7 +232,8 @@ def split(line: str, separator: str) -> list[str]:
     if not separator:
         cells = line.split()
     elif '"' in line:
-        cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
+        whole = line.replace("\r", " ")  # csv takes one for the end of a line
+        cells = next(csv.reader([whole], delimiter=separator, skipinitialspace=True), [])
     else:
         return [cell.strip() for cell in line.split(separator)]
     return [cell.strip().strip('"').strip() for cell in cells]

@@ -30,12 +30,6 @@ def bag(folder: Path) -> Path:
     return Path(written("db3", folder, States(sent(LOG))))
 
 
-def taken(*sources: str, **more: Any) -> Profile:
-    """Settings that name each channel's field."""
-    named = {name: {"source": own} for name, own in zip(PLACES, sources, strict=True)}
-    return Profile.model_validate(named | more)
-
-
 def described(folder: Path, names: list[str], more: str = "") -> Path:
     """A folder of empty databases, and metadata that list them."""
     folder.mkdir()
@@ -100,10 +94,13 @@ def test_folders_that_are_no_bag_are_refused(
 def test_a_field_needs_a_topic_and_a_topic_its_field(tmp_path: Path) -> None:
     path = bag(tmp_path)
     sources = ("position[0]", "position[1]", "effort[0]", "effort[1]")
+    named: dict[str, Any] = {
+        name: {"source": own} for name, own in zip(PLACES, sources, strict=True)
+    }
     alone = r"theta1 is taken from 'position\[0\]' without a topic: --topic NAME"
     with pytest.raises(LogError, match=alone):
-        read_log(path, taken(*sources))
-    log = read_log(path, taken(*sources, topic="/joint_states"))
+        read_log(path, Profile.model_validate(named))
+    log = read_log(path, Profile.model_validate(named | {"topic": "/joint_states"}))
     assert np.array_equal(log.tau, LOG.tau)
     with pytest.raises(LogError, match=r"no message on '/other' has .*--set tau2.topic=NAME"):
         read_log(path, Profile.model_validate({"tau2": {"source": "effort[0]", "topic": "/other"}}))

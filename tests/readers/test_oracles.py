@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +11,9 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
-from tests.readers.logs import EPOCH_NS, noise_log
+from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import write_mcap
 
 TOPIC = "/arm"
@@ -103,57 +101,30 @@ def custom(_stamp: int, values: Sequence[float], draw: np.random.Generator) -> A
     )
 
 
-def indexed(*paths: str) -> dict[str, Any]:
-    """A profile that names each channel's field."""
-    return {
-        "topic": TOPIC,
-        **{name: {"source": path} for name, path in zip(CHANNELS, paths, strict=True)},
-    }
+PLACES = ("joints[0].angle", "joints[1].angle", "joints[0].torques[1]", "joints[1].torques[1]")
+NAMED = {name: {"source": path} for name, path in zip(CHANNELS, PLACES, strict=True)}
 
 
-@dataclass(frozen=True)
-class Kind:
-    """A type of message: how one is made, and what tells its joints to algid."""
-
-    type: str
-    make: Callable[[int, Sequence[float], np.random.Generator], Any]
-    profile: dict[str, Any]
-
-
-STATE = ("joints[0].angle", "joints[1].angle", "joints[0].torques[1]", "joints[1].torques[1]")
-
-
-KINDS = (
-    Kind("control_msgs/msg/DynamicJointState", dynamic, {"joints": ["shoulder", "elbow"]}),
-    Kind("lab/msg/State", custom, indexed(*STATE)),
-)
-
-
-def write(path: Path, kind: Kind, log: Log, *, little: bool) -> None:
-    """The log as messages of a kind, serialised by rosbags."""
-    draw = np.random.default_rng(8)
-    rows = np.concatenate([log.theta, log.tau]).T.tolist()
-    messages = [
-        (
-            TOPIC,
-            stamp,
-            bytes(
-                store().serialize_cdr(kind.make(stamp, row, draw), kind.type, little_endian=little)
-            ),
-        )
-        for stamp, row in zip(log.stamp_ns.tolist(), rows, strict=True)
-    ]
-    definition, _ = store().generate_msgdef(kind.type, ros_version=2)
-    write_mcap(path, messages, (kind.type, "ros2msg", definition.encode()))
-
-
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.type.split("/")[-1])
 @pytest.mark.parametrize("little", [True, False], ids=["little", "big"])
-def test_every_type_reads_as_rosbags_wrote_it(kind: Kind, little: bool, tmp_path: Path) -> None:
-    log = noise_log(60, start_ns=EPOCH_NS, velocity=False)
-    path = tmp_path / "log.mcap"
-    write(path, kind, log, little=little)
-    found = read_log(path, Profile.model_validate(kind.profile))
-    ours = np.concatenate([found.theta, found.tau])
-    assert np.array_equal(found.stamp_ns, log.stamp_ns)
-    assert ours.tobytes() == np.concatenate([log.theta, log.tau]).tobytes()
+@pytest.mark.parametrize(
+    ("kind", "make", "settings"),
+    [
+        ("control_msgs/msg/DynamicJointState", dynamic, {"joints": ["shoulder", "elbow"]}),
+        ("lab/msg/State", custom, {"topic": TOPIC} | NAMED),
+    ],
+)
+def test_every_type_reads_as_rosbags_wrote_it(
+    kind: str,
+    make: Callable[[int, Sequence[float], np.random.Generator], Any],
+    settings: dict[str, Any],
+    little: bool,
+    tmp_path: Path,
+) -> None:
+    log, draw = noise_log(60, start_ns=EPOCH_NS, velocity=False), np.random.default_rng(8)
+    rows, messages = np.concatenate([log.theta, log.tau]).T.tolist(), []
+    for stamp, row in zip(log.stamp_ns.tolist(), rows, strict=True):
+        data = store().serialize_cdr(make(stamp, row, draw), kind, little_endian=little)
+        messages.append((TOPIC, stamp, bytes(data)))
+    definition, _ = store().generate_msgdef(kind, ros_version=2)
+    write_mcap(tmp_path / "log.mcap", messages, (kind, "ros2msg", definition.encode()))
+    assert same(read_log(tmp_path / "log.mcap", Profile.model_validate(settings)), log)
