@@ -188,7 +188,8 @@ def _of_mass(found: Fitted) -> Iterator[Notice]:
         mass = abs(float(fit.values[fit.names.index(K4)])) / (fit.shared.model.gravity * length)
         if mass > STEEL * length**3:
             numbers = {"case": "heavy", "mass": mass, "length": length}
-            yield Notice("OTHER_UNIT", numbers=numbers)
+            milli = Remedy({"torque_unit": "mN m"}, "where torques are in mN m")
+            yield Notice("OTHER_UNIT", numbers=numbers, remedies=(milli,))
 
 
 def _of_gains(found: Fitted) -> Iterator[Notice]:

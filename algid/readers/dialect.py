@@ -13,6 +13,7 @@ from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.text import counted
 from algid.base.units import is_foreign, unit_of
+from algid.options import flag
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -145,6 +146,11 @@ def detect(head: bytes, names: Sequence[str] | None = None) -> Dialect:
     above = [line.removeprefix(comment or "").strip() for line in lines[:number]]
     if all(_is_number(cell) for cell in columns if cell):
         skip, rows = 0, [header, *rows]
+        if names and len(names) != len(columns):
+            raise LogError(
+                f"{counted(len(columns), 'column')}, and {counted(len(names), 'name')} for "
+                f"them: {', '.join(names)[:200]}; name each: {flag('columns')}"
+            )
         # the header may be one of the comments above
         texts = [list(names or ()), *(split(text, separator) for text in reversed(above))]
         fitting = [one for one in texts if len(one) == len(columns)]

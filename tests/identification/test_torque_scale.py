@@ -86,7 +86,9 @@ def test_an_arm_of_lead_asks_for_the_unit_of_its_torques() -> None:
     """Torques in mN m that nobody labelled make every constant a thousand times too large."""
     (asked,) = [one for one in identify(log_of(1e3), report=False).notices if one.key == HEAVY]
     assert 200 < asked.numbers["mass"] < 350
-    assert asked.clause.endswith(": check the torque unit")
+    assert ": check the torque unit" in asked.clause
+    (remedy,) = asked.remedies
+    assert remedy.flags == ("--torque-unit", "mN m")
     assert HEAVY not in {one.key for one in identify(log_of(), report=False).notices}
 
 
