@@ -23,7 +23,6 @@ from algid.estimators.noise import (
     VarianceScore,
     first_guess,
     floored,
-    largest_change,
     log_ratio,
     newton_step,
     quantum,
@@ -174,14 +173,17 @@ class LogEvidence:
         outcome = gathered.outcome(self.loaded, c)
         if not scored:
             return outcome
-        score = reduce(add, scores)
-        step = self._improve_noise(score, outcome.information)
+        score, before = reduce(add, scores), self.noise
+        self.noise = floored(newton_step(before, score, outcome.information.total[0]), self._floor)
+        step = log_ratio(before, self.noise)
         followed = np.where(np.abs(step) < _FOLLOWED, step, 0.0)
         for place, response in enumerate(responses):
             moved = np.einsum("i,ian->an", followed, response)
             self._trajectories[place] = self._trajectories[place] + moved
         information = gathered.followed(outcome.information, followed, score)
-        return replace(outcome, information=information, noise_change=largest_change(step, score))
+        # in its own standard deviations
+        change = float(np.max(np.abs(step) * np.sqrt(np.diag(score.average))))
+        return replace(outcome, information=information, noise_change=change)
 
     def held(self, shared: Shared, beta: FloatArray) -> Outcome:
         """Pass over the training set at `beta`; trajectories and noise levels stay."""
@@ -228,12 +230,6 @@ class LogEvidence:
             gram = gram + by_joint @ by_joint.swapaxes(1, 2)
             determinant += 2 * float(np.log(linear.factor[-1]).sum())
         return gram, determinant
-
-    def _improve_noise(self, score: VarianceScore, information: LogInformation) -> FloatArray:
-        """Better noise levels; the change (4,) of each log variance."""
-        before, (S, _) = self.noise, information.total
-        self.noise = floored(newton_step(before, score, S), self._floor)
-        return log_ratio(before, self.noise)
 
     def _linearise(
         self,

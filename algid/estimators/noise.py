@@ -334,11 +334,6 @@ def log_ratio(before: NoiseLevels, after: NoiseLevels) -> FloatArray:
     return np.asarray(2 * np.log(ratio))
 
 
-def largest_change(step: FloatArray, score: VarianceScore) -> float:
-    """Largest change of log variances, which change by `step` (4,), in its own deviations."""
-    return float(np.max(np.abs(step) * np.sqrt(np.diag(score.average))))
-
-
 def floored(noise: NoiseLevels, floor: NoiseLevels) -> NoiseLevels:
     """Levels no smaller than `floor`."""
     return NoiseLevels(np.maximum(noise.theta, floor.theta), np.maximum(noise.tau, floor.tau))

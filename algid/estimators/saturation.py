@@ -173,22 +173,14 @@ def _guard(dt: float) -> int:
     return max(2, round(_GUARD / dt))
 
 
-def _spread(beyond: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
-    """Samples (N,) that lie within `reach` of one that is `beyond`.
-
-    (`scipy.ndimage.binary_dilation` does the same; its import takes longer than a short log.)
-    """
-    count = np.concatenate([[0], np.cumsum(np.pad(beyond, reach))])
-    return np.asarray(count[2 * reach + 1 :] > count[: -2 * reach - 1])
-
-
 def _cut(held: Segment, limits: Sequence[Limit], first: int, last: int) -> Iterator[Segment]:
     """The stretches from sample `first` to `last` - 1 that lie far enough from any limit."""
     beyond = np.zeros(len(held), dtype=bool)
     for one in limits:
         beyond |= one.beyond(held.tau)
     if beyond.any():
-        beyond = _spread(beyond, _guard(held.dt))
+        near = _guard(held.dt)
+        beyond = np.convolve(np.pad(beyond, near), np.ones(2 * near + 1), "valid") > 0.5
     inside = np.concatenate([[True], beyond[first:last], [True]])
     edges = np.flatnonzero(np.diff(inside.astype(np.int8))) + first
     for start, end in edges.reshape(-1, 2).tolist():
