@@ -164,7 +164,13 @@ def test_readings_differ_by_what_decides_the_estimates() -> None:
 def test_a_log_is_made_of_arrays_either_way_round_and_gives_the_same_result() -> None:
     log, _ = algid.synthesise("case1", duration=2.0, torque="wide")
     weak = algid.Settings(estimator="weak")
-    one = algid.identify(algid.Log.from_arrays(log.t, log.theta, log.tau), settings=weak)
+    told = list[tuple[str, int, int]]()
+    given = algid.Log.from_arrays(log.t, log.theta, log.tau)
+    one = algid.identify(given, settings=weak, progress=lambda *step: told.append(step))
+    ends = {stage: (done, total) for stage, done, total in told}  # of each stage the last
+    assert next(iter(ends)) == "reading"
+    assert set(ends.values()) == {(2001, 2001)}
+    assert all(0 <= done <= total for _, done, total in told)
     other = algid.identify(algid.Log.from_arrays(log.t, log.theta.T, log.tau.T), settings=weak)
     assert one.parameters == other.parameters
     with pytest.raises(LogError, match=r"^log: theta: expected the shape \(2, 2001\)"):
@@ -183,7 +189,7 @@ def test_a_log_is_made_of_arrays_either_way_round_and_gives_the_same_result() ->
     ("changes", "why"),
     [
         ({"theta": np.full((2, 501), np.nan)}, "theta: expected finite"),
-        ({"tau": np.zeros((2, 501), dtype=int)}, "tau: expected float64, found int64"),
+        ({"tau": np.zeros((2, 501), dtype=int)}, "tau: expected finite float64, its type is int64"),
         ({"stamp_ns": np.arange(501.0)}, "stamp_ns: expected increasing integers"),
         ({"stamp_ns": np.zeros(501, dtype=np.int64)}, "stamp_ns: expected increasing integers"),
     ],
@@ -198,6 +204,20 @@ def test_a_log_whose_arrays_are_not_a_logs_is_refused_in_a_line(
             verb(replace(log, **changes))
     with pytest.raises(LogError, match=r"^case1-unloaded: expected two samples or more, found 1"):
         algid.identify(log.part(0, 1))
+
+
+@pytest.mark.parametrize(("step", "told"), [(0.199, []), (0.201, ["OTHER_UNIT:slow time"])])
+def test_a_clock_too_slow_for_an_arm_is_doubted(step: float, told: list[str]) -> None:
+    t = step * np.arange(30)
+    rows = np.stack([np.sin(t), np.cos(t)])
+    columns = {"t": t} | dict(
+        zip(("theta1", "theta2", "tau1", "tau2"), [*rows, *rows], strict=True)
+    )
+    read = algid.read_log(columns)
+    for log in (read, algid.Log.from_arrays(t, rows, rows)):
+        assert [one.key for one in log.notices] == told
+    assert [one.remedies[0].settings for one in read.notices] == [{"time_unit": "ms"} for _ in told]
+    assert algid.read_log(columns, time_unit="s").notices == ()
 
 
 @pytest.mark.parametrize("logs", [None, [], ()])
@@ -330,7 +350,7 @@ def test_columns_in_memory_are_read_as_a_file_of_them(
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({"tau2": "a"}, "^log: column 'tau2' for tau2 holds string; expected numbers$"),
+        ({"tau2": "a"}, "^log: column 'tau2' for tau2 holds string_view; expected numbers$"),
         ({"tau2": None}, "^log: column 'tau2' for tau2 holds null; expected numbers$"),
         ({"theta1 [deg]": float("nan")}, "^log: theta1 .* expected a finite number"),
     ],

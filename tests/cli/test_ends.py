@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from shutil import copyfile
 from types import SimpleNamespace
@@ -173,6 +174,10 @@ def synthetic(folder: Path, *flags: str, role: str = "unloaded") -> pl.DataFrame
 
 
 def test_a_start_and_a_schedule_are_taken(tmp_path: Path) -> None:
+    for year in (1970, 2037):
+        options: dict[str, Any] = {"duration": 0.1, "start_time": f"{year}-01-02"}
+        stamp = algid.synthesise("case1", **options)[0].stamp_ns[0] / 1e9
+        assert datetime.fromtimestamp(stamp, UTC) == datetime(year, 1, 2, tzinfo=UTC)
     began = synthetic(tmp_path / "began", "--set", "initial=-1,0.25,0.5,-0.75")
     first = began.select("theta1", "theta2", "omega1", "omega2").row(0)
     assert first == (-1, 0.25, 0.5, -0.75)

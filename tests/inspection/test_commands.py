@@ -37,6 +37,9 @@ def test_inspect_tells_what_a_log_is(kind: str, tmp_path: Path) -> None:
     text = run("inspect", tmp_path / f"arm.{kind}")
     assert "condition number" in text
     found = json.loads(run("inspect", tmp_path / f"arm.{kind}", "--format", "json"))
+    kinds = {(one["type"], one["count"]) for one in found["entries"]}
+    known = {"csv": {("double", None)}, "parquet": {("double", 6000), ("int64", 6000)}}
+    assert kinds == known.get(kind, {("sensor_msgs/msg/JointState, cdr", 6000)})
     assert found["refused"] is None
     assert found["clock"]["rows"] == 6000
     assert found["clock"]["rate"] == pytest.approx(1000)

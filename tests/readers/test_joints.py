@@ -103,18 +103,20 @@ def test_everything_a_reader_was_told_is_in_the_origin(tmp_path: Path) -> None:
 def test_other_joints_of_a_table_that_move_are_told_by_their_names(
     form: str, tmp_path: Path
 ) -> None:
-    """The first creeps, the last turns through 0.6 rad; the two between are those to read."""
-    names = list("1234") if "deg" in form else ["base", "shoulder", "elbow", "wrist"]
+    """The first creeps, the last two turn through 0.6 and 1 rad; those between are to be read."""
+    names = list("12345") if "deg" in form else ["base", "shoulder", "elbow", "wrist", "hand"]
     t = np.arange(400) * 0.01
     swing = np.sin(2 * t)
     columns = {"time": t, "/joint_commands/gripper/position": swing}  # no joint of this topic
-    for name, angle in zip(names, (0.0099 * swing, swing, np.cos(3 * t), 0.3 * swing), strict=True):
+    angles = (0.0099 * swing, swing, np.cos(3 * t), 0.3 * swing, 0.5 * swing)
+    for name, angle in zip(names, angles, strict=True):
         for own, values in zip(form.split(), (angle, 0.1 * angle), strict=True):
             columns[own.format(name)] = np.degrees(values) if "deg" in own else values
     pl.DataFrame(columns).write_csv(tmp_path / "log.csv")
     log = read_log(tmp_path / "log.csv", Profile(joints=(names[1], names[2])))
     (text,) = (one.text for one in log.notices if one.code == "OTHER_JOINTS")
-    assert f"1 other joint moves meanwhile: {names[3]} by 0.6 rad" in text
+    others = f"{names[4]} by 1 rad and {names[3]} by 0.6 rad"
+    assert f"2 other joints move meanwhile: {others}" in text
 
 
 def test_of_two_topics_with_both_joints_it_is_said_which_was_taken(tmp_path: Path) -> None:

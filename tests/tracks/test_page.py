@@ -29,6 +29,7 @@ from algid.tracks.payload import track_log
 from algid.tracks.result import TrackResult, read_track, track_json
 from algid.writers import write_log
 from tests.cli.commands import app
+from tests.report.pages import Page
 from tests.tracks.folders import CASE, noisy
 
 START_NS = 1_700_000_000_000_000_000
@@ -142,6 +143,17 @@ def test_the_command_prints_json_alone_and_keeps_what_is_there(
 def test_a_track_is_read_back_as_it_was(result: TrackResult, tmp_path: Path) -> None:
     folder = tmp_path / "picking.track"
     write_track(result, folder)
+    told = json.loads((folder / "track.json").read_text(encoding="utf-8"))
+    for one, row, status in zip(
+        told["stretches"], result.track.stretches, result.statuses, strict=True
+    ):
+        assert (one["m_p"], one["ci95"], one["status"]) == (row.m_p, [*row.ci95], status.value)
+        assert (one["unit"], one["truth"]) == ("kg", pytest.approx(row.m_p, abs=6 * row.std))
+    page = Page((folder / "report.html").read_text(encoding="utf-8"))
+    names = ["Payload by stretch", "Changes", "Fit", "Logs", "Channels", "Settings", "Provenance"]
+    assert list(page.tables) == names
+    for words in ("Payload in time", "Data quality", "Settings and provenance", "arm of arm.algid"):
+        assert words in page.prose
     again = read_track(folder)
     assert track_json(again) == track_json(result)
     assert verdict(again) == verdict(result)
