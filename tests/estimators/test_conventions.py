@@ -1,12 +1,12 @@
-"""Wrong conventions are told from the motion of a simulated arm, each is mended, and right logs
-are never accused.
+"""Wrong conventions are told from the motion of a simulated arm, and right logs are never accused.
+
+That what is named mends a log is held where logs are read.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ from algid.estimators.conventions import AS_READ, Convention
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
 from pipelines.accuracy_scenes import random_arm
-from pipelines.conventions import INVISIBLE, NOTICED, SPOILS, Spoil
+from pipelines.conventions import SPOILS
 from tests.estimators.conftest import DT, Bench
 
 Pair = tuple[FloatArray, FloatArray]
@@ -48,47 +48,9 @@ def judged(theta: FloatArray, tau: FloatArray) -> Judgement:
     return judge_together([Recorded(theta, tau, DT)])
 
 
-EVERY: dict[str, Spoil] = {
-    **SPOILS,
-    "θ1 off by 180°": lambda a, b, s, t: (a + np.pi, b, s, t),
-    "angles swapped": lambda a, b, s, t: (b, a, s, t),
-    "three at once": lambda a, b, s, t: (a + np.pi / 2, -(a + b), s, -t),
-    "degrees": lambda a, b, s, t: (np.degrees(a), np.degrees(b), s, t),
-}
-
-
-READ: dict[str, tuple[Any, ...]] = {
-    "said to be absolute": (-1, 1),
-    "said to be driven from the base": (1, -1),
-    "said to be in degrees": (1, 1, [np.pi / 180]),
-}
-"""By what such a log was read: `absolute`, `base` and `unit_scales` of `Recorded`."""
-
-
 def spoiled(name: str, theta: FloatArray, tau: FloatArray) -> Pair:
-    a, b, s, t = EVERY[name](*theta, *tau)
+    a, b, s, t = SPOILS[name](*theta, *tau)
     return np.stack([a, b]), np.stack([s, t])
-
-
-@pytest.mark.parametrize("row", sorted(EVERY.keys() - {"nothing", *NOTICED, *INVISIBLE}))
-def test_the_convention_that_is_named_undoes_the_mistake(bench: Bench, row: str) -> None:
-    theta, tau = measured(bench.bare)
-    wrong = spoiled(row, theta, tau)
-    found = judge_together([Recorded(*wrong, DT, None, *READ.get(row, ()))])
-    assert found.alone
-    assert found.best.convention != AS_READ
-    mends = [found.best.convention, found.best.convention.mirrored()]
-    if row == "θ1 off by 180°":
-        mends.append(replace(AS_READ, signs=(-1, -1), torque_signs=(-1, -1), zero=(np.pi, 0.0)))
-    # The log again, or the log from behind: cos θ1 and sin θ1 tell angles but for turns. Zeros are
-    # fitted to a thousandth, and a free scale to 1e-4 of angles of some ten rad.
-    undone = [
-        np.allclose(np.exp(1j * one.angles(wrong[0])), np.exp(1j * right), atol=0.01)
-        and np.allclose(one.torques(wrong[1]), sense * tau, atol=1e-12)
-        for one in mends
-        for sense, right in ((1, theta), (-1, np.stack([np.pi - theta[0], -theta[1]])))
-    ]
-    assert any(undone)
 
 
 @pytest.mark.parametrize("signs", [(1, 1), (1, -1)])
@@ -186,7 +148,7 @@ def test_an_arm_with_one_motor_tells_its_convention(
     np.testing.assert_allclose(found.best.k[:5], k[:5], rtol=0.02, atol=0.02 * k[:5].max())
 
 
-@pytest.mark.parametrize("row", ["nothing", "τ1", "θ2 absolute", "three at once", "noise"])
+@pytest.mark.parametrize("row", ["nothing", "τ1", "θ2 absolute", "zero hanging", "noise"])
 def test_no_convention_that_is_passed_over_comes_nearer(bench: Bench, row: str) -> None:
     """Every convention with its zeros by quarter turns, against those that bounds leave."""
     theta, tau = measured(bench.bare)

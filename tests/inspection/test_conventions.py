@@ -51,7 +51,9 @@ def recorded(name: str) -> tuple[FloatArray, FloatArray]:
         case "base, tau2 reversed":
             return RIGHT.theta, np.stack([p - q, -q])
         case "motor":
-            return np.stack([7 * a, b]), RIGHT.tau
+            return np.stack([9.6 * a, b]), RIGHT.tau
+        case "zero of joint 2, absolute, reversed":
+            return np.stack([a, -(a + b) - 0.5]), np.stack([p, -q])
         case _:
             return np.degrees(RIGHT.theta) / 20, RIGHT.tau  # within what reads as rad
 
@@ -64,6 +66,7 @@ ROWS = (
     "torques swapped",
     "base, tau2 reversed",
     "motor",
+    "zero of joint 2, absolute, reversed",
     "degrees",
 )
 
