@@ -7,16 +7,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from algid.arm import CONSTANT_NAMES, FloatArray
-from algid.base.errors import ResultError, SettingError
+from algid.arm import CONSTANT_NAMES
+from algid.base.errors import SettingError
 from algid.base.files import refuse_misleading, result_folder, whole_folder
 from algid.base.progress import Progress
 from algid.base.runtime import one_blas_thread
 from algid.estimators.paper import SHORTEST
 from algid.identification.by_paper import run_paper
-from algid.identification.known import contradictions, prior_of, read_otherwise, reused
+from algid.identification.known import (
+    contradictions,
+    prior_of,
+    read_otherwise,
+    reused,
+    torque_constants,
+)
 from algid.identification.outcome import judged
 from algid.identification.recordings import (
     LogLike,
@@ -25,6 +29,7 @@ from algid.identification.recordings import (
 )
 from algid.identification.series import residual_of, write_fit_series
 from algid.methods import estimator_of, settles
+from algid.model import Model
 from algid.options import flag
 from algid.physics.effort import absent
 from algid.results import Result, read_result, write_result
@@ -54,18 +59,6 @@ class Earlier:
         if isinstance(parameters, Result):
             return cls(parameters, parameters.log.path)
         return cls(read_result(parameters), str(parameters))
-
-    @property
-    def constants(self) -> FloatArray:
-        """Its k1 … k7 (7,); raises `ResultError` where it lacks one."""
-        found = [self.result.parameters.get(name) for name in CONSTANT_NAMES]
-        known = np.array([one and one.estimate for one in found], dtype=np.float64)
-        if np.isnan(known).any():
-            raise ResultError(
-                f"{self.file}: the result lacks a constant; identify the arm from a better log "
-                "first"
-            )
-        return known
 
 
 def identify(
@@ -220,7 +213,9 @@ def _identified(
     """
     with one_blas_thread():
         if settles(settings.estimator):
-            known = None if earlier is None else earlier.constants
+            known = None
+            if earlier is not None:
+                known = torque_constants(earlier.result, Model(), "unloaded", earlier.file)
             result = run_paper(survey, settings, known, folder)
         else:
             result = _by_likelihood(survey, settings, earlier, stated, folder if series else None)
