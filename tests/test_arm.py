@@ -74,8 +74,6 @@ def test_forward_dynamics_inverts_inverse_dynamics() -> None:
     )
 
 
-
-
 def test_what_is_handed_out_read_only_cannot_be_written_to() -> None:
     own = np.arange(3.0)
     view = read_only(own)

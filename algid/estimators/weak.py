@@ -40,7 +40,7 @@ from algid.estimators.modulating_functions import OVERLAP, Known, Windows, row_w
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
 from algid.model import DELAYS, K2, K4, attributes
-from algid.signals.differences import held_torque
+from algid.signals.differences import Stencil
 from algid.signals.segments import Segment, append, pieces
 
 Gathered = TypeVar("Gathered")
@@ -323,8 +323,8 @@ def overlapping(
             piece = replace(append(before.part(first, len(before)), piece), continues=True)
         left_over = (len(piece) - 2 * windows.margin) % windows.step
         before = piece
-        if settings.shift.held:
-            piece = replace(piece, tau=held_torque(piece.tau))
+        if settings.shift.held and len(piece) > 1:
+            piece = replace(piece, tau=Stencil(piece.dt, held=True).moving(piece.tau))
         yield piece, windows, fresh
 
 

@@ -42,7 +42,7 @@ class Stencil:
     shift : float, s
         How long after its stamp a torque acts: hold and delay together.
     held : bool
-        Whether each torque was held until the next: see `held_torque`.
+        Whether each torque was held until the next: see `HELD`.
     lag : float, s
         Time constant of a first-order low-pass that the logged torque went through.
     """
@@ -75,7 +75,7 @@ class Stencil:
     def taps(self) -> FloatArray:
         """What a logged torque and its neighbours, as many on either side, count for.
 
-        A held one is that of `held_torque`; a low-pass is undone by 1 + lag d/dt.
+        A held one counts by `HELD`; a low-pass is undone by 1 + lag d/dt.
         """
         taps = HELD if self.held else np.ones(1)
         if self.lag:
@@ -85,7 +85,10 @@ class Stencil:
         return taps
 
     def moving(self, tau: FloatArray) -> FloatArray:
-        """Torque (..., N) that moves the arm, of the logged one; the ends go on by reflection."""
+        """Torque (..., N) that moves the arm, of the logged one.
+
+        The ends of two samples or more go on by reflection.
+        """
         reach = self.taps.size // 2
         return weighted(reflected(tau, reach), self.taps) if reach else tau
 
@@ -125,31 +128,12 @@ def weighted(signal: FloatArray, taps: FloatArray) -> FloatArray:
 
 
 HELD = np.array([1.0, 22.0, 1.0]) / 24
-"""What a held torque and its neighbours count for: see `held_torque`."""
+"""What a held torque and its neighbours count for, half a sample after its stamp.
 
-
-def held_torque(tau: FloatArray) -> FloatArray:
-    """Smooth torque that moves an arm through the same samples as the held torque `tau`.
-
-    Parameters
-    ----------
-    tau : (..., N) float64, N m
-
-    Returns
-    -------
-    (..., N) float64, N m, half a sample after the stamps of `tau`; its first and last value are
-    those of `tau`
-
-    Notes
-    -----
-    Under a held torque u the angles obey θ[n+1] − 2 θ[n] + θ[n−1] = dt²/2 (u[n] + u[n−1]) per unit
-    of inertia; under a smooth one a, dt² (a + dt²/12 a″). Hence a = u + dt²/24 u″ half a sample
-    later, with an error O(dt⁴).
-    """
-    result = tau.copy()
-    result[..., 1:-1] = HELD[0] * tau[..., :-2] + HELD[1] * tau[..., 1:-1] + HELD[2] * tau[..., 2:]
-    return result
-
+Under a held torque u the angles obey θ[n+1] − 2 θ[n] + θ[n−1] = dt²/2 (u[n] + u[n−1]) per unit of
+inertia; under a smooth one a, dt² (a + dt²/12 a″). Hence a = u + dt²/24 u″ half a sample later,
+with an error O(dt⁴).
+"""
 
 FEWEST_SAMPLES = 4
 

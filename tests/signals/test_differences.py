@@ -3,7 +3,7 @@ import pytest
 
 from algid.estimators.whitening import Linearised, covariance_factor
 from algid.model import Motion
-from algid.signals.differences import POINTS, Stencil, held_torque
+from algid.signals.differences import POINTS, Stencil
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.5e-3, 3.3e-3, -1.2e-3])
@@ -28,9 +28,9 @@ def test_a_held_torque_moves_an_inertia_like_the_smooth_one_to_fourth_order() ->
         tau = np.sin(5 * dt * np.arange(round(2 / dt)))
         omega = np.concatenate([[0.0], np.cumsum(tau)]) * dt
         theta = np.concatenate([[0.0], np.cumsum(omega[:-1] * dt + tau * dt**2 / 2)])[:-1]
-        stencil = Stencil(dt, 0.5 * dt)
+        stencil = Stencil(dt, 0.5 * dt, held=True)
         alpha = stencil.differences(np.stack([theta, theta]))[2, 0]
-        errors.append(np.abs(held_torque(tau)[stencil.torques(tau.size)] - alpha).max())
+        errors.append(np.abs(stencil.moving(tau)[stencil.torques(tau.size)] - alpha).max())
     slopes = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.allclose(slopes, 4, atol=0.1)
 
