@@ -251,7 +251,7 @@ def by_free_lengths(found: Fitted) -> Fitted:
         return found
     fit = finished(found.fit.with_free_lengths, found.settings)
     for notice in wrong:
-        fit = fit.noted(replace(notice, numbers={**notice.numbers, "case": "left out"}))
+        fit = fit.noted(Notice(notice.code, numbers={**notice.numbers, "case": "left out"}))
     return replace(found, fit=fit)
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from algid.arm import FloatArray
 from algid.estimators.noise import (
@@ -120,9 +121,7 @@ def _loop(noise: float, count: int = 6000) -> tuple[FloatArray, FloatArray]:
     rng = np.random.default_rng(4)
     t = 1e-3 * np.arange(count)
     theta = np.stack([np.sin(5 * t), np.cos(3 * t)]) + 1e-3 * rng.standard_normal((2, count))
-    slope = np.zeros((2, count))
-    for n in range(1, count):
-        slope[:, n] = 0.5 * slope[:, n - 1] + 0.5 * (theta[:, n] - theta[:, n - 1]) / 1e-3
+    slope = lfilter([500.0, -500.0], [1.0, -0.5], theta - theta[:, :1])
     mixed = np.array([[1.0, 0.3], [0.2, 1.0]])
     tau = -mixed @ (3 * theta + 0.2 * slope) + noise * rng.standard_normal((2, count))
     return theta, tau

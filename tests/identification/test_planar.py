@@ -47,8 +47,10 @@ def test_a_wrong_length_is_named_and_no_estimate_rests_on_it(name: str, share: f
     lengths = {"l1": ARM.l1, "l2": ARM.l2}
     given = lengths | {name: share * lengths[name]}
     result = identify(*logs, Settings.model_validate(given), report=False)
-    named = [one.numbers["name"] for one in of_codes(result.notices, "LENGTH_CONTRADICTED")]
+    wrong = of_codes(result.notices, "LENGTH_CONTRADICTED")
+    named = [one.numbers["name"] for one in wrong]
     assert named == [name] * (share != 1)
+    assert all("all estimates are without given lengths" in one.text for one in wrong)
     assert not of_codes(result.notices, "LOGS_APART")
     assert result.verdict.failed is bool(named)
     truth = dict(zip(CONSTANT_NAMES, ARM.phasors(), strict=False)) | {"m_p": CARRIED}
