@@ -139,11 +139,6 @@ class Model:
         """Names of the columns in their order."""
         return self.compiled.names
 
-    @cached_property
-    def columns(self) -> list[int]:
-        """Where each column stands in `COLUMN_NAMES`."""
-        return list(map(COLUMN_NAMES.index, self.names))
-
     @property
     def linear(self) -> bool:
         """Whether the torque is linear in the coefficients, so that the regressor needs none."""
@@ -171,15 +166,9 @@ class Model:
             return 0.0
         return float(c[self.names.index(self.lag_name)].flat[0])  # one low-pass for the whole log
 
-    def expand(self, c: FloatArray) -> FloatArray:
-        """Coefficients of all `COLUMN_NAMES`: zero where a column is switched off."""
-        full = np.zeros(len(COLUMN_NAMES))
-        full[self.columns] = c
-        return full
-
     def values(self, c: FloatArray) -> dict[str, float]:
         """Coefficients of all `COLUMN_NAMES` by name: zero where a column is switched off."""
-        return dict(zip(COLUMN_NAMES, self.expand(c).tolist(), strict=True))
+        return dict.fromkeys(COLUMN_NAMES, 0.0) | dict(zip(self.names, c.tolist(), strict=True))
 
 
 def without_delay(terms: Iterable[str]) -> tuple[str, ...]:
@@ -457,17 +446,11 @@ def link_motion(model: Model, c: FloatArray, motion: Motion) -> Motion:
 
 
 def phasor(model: Model, c: FloatArray, name: str) -> complex:
-    """The moment `name` of the coefficients `c` (q,) as a phasor, its sine part imaginary.
+    """The moment `name` of the coefficients `c` (q,), or of more, as a phasor; 0 without a column.
 
-    0 without a column.
+    Its sine part is imaginary.
     """
-    place = model.compiled.place
-    if name not in place:
-        return 0j
-    sine = SINE_OF.get(name, "")
-    if sine not in place:
-        return complex(c[place[name]])
-    return complex(c[place[name]], c[place[sine]])
+    return phasor_of(dict(zip(model.names, c.tolist(), strict=False)), name)
 
 
 def phasor_of(values: Mapping[str, float], name: str) -> complex:
@@ -619,20 +602,6 @@ def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
 def smooth_sign(model: Model, omega: FloatArray) -> FloatArray:
     """The smooth sign tanh(ω / ω_s) of velocities."""
     return np.tanh(omega / model.coulomb_speed)
-
-
-def damping(model: Model, c: FloatArray) -> FloatArray:
-    """Derivative (2,) of each joint's torque by its velocity at rest, in N m s/rad.
-
-    Without friction by load.
-    """
-    rest = Motion(np.zeros((2, 1)), np.zeros((2, 1)), np.zeros((2, 1)))
-    values = Values(rest, model.shape)
-    damped = np.empty(2)
-    for joint in range(2):
-        slope = summed(model.compiled.partials[1, joint, joint], c, values)
-        damped[joint] = float(np.squeeze(slope))
-    return damped
 
 
 def inertia(model: Model, c: FloatArray, theta: FloatArray) -> FloatArray:

@@ -32,7 +32,7 @@ from algid.estimators.combine import left_out
 from algid.estimators.elastic import flexed
 from algid.estimators.fit import Fit
 from algid.estimators.problem import Source
-from algid.model import F1, F2, Model, Motion, advanced, damping, inertia, regressor
+from algid.model import F1, F2, Model, Motion, advanced, inertia, partials, regressor
 from algid.signals.filters import butterworth, correlate, smoother
 from algid.signals.segments import Segment, pieces
 from algid.signals.shift import AT_ONCE, TorqueShift
@@ -343,7 +343,8 @@ def stiffness(model: Model, c: FloatArray) -> float:
     """The rate in 1/s at which friction stops either joint near rest, in its worst pose."""
     around = np.linspace(0, 2 * np.pi, _POSES, endpoint=False)
     (outer, coupling), (_, inner) = inertia(model, c, np.stack([np.zeros_like(around), around]))
-    slope = np.abs(damping(model, c))
+    rest = Motion(*np.zeros((3, 2, 1)))
+    slope = np.abs(partials(model, c, rest)[1, (0, 1), (0, 1), 0])
     least = np.maximum(outer * inner - coupling**2, 1e-3 * outer * inner)
     return float(np.max(np.maximum(slope[0] * inner, slope[1] * outer) / least))
 

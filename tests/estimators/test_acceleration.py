@@ -13,7 +13,6 @@ from algid.model import (
     Model,
     Motion,
     acceleration,
-    damping,
     torque,
 )
 from tests.estimators.test_model import VALUES
@@ -52,13 +51,3 @@ def test_a_load_whose_sign_turns_is_found_from_either_side() -> None:
     np.testing.assert_array_equal(tau, kept)
     again = torque(model, c, Motion(theta, omega, found))
     np.testing.assert_allclose(again, tau, rtol=1e-9, atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    "terms", [(), ("coulomb",), ("coulomb", "asymmetry"), ("coulomb", "stribeck"), ("offset",)]
-)
-def test_damping_at_rest_is_the_torques_difference(terms: tuple[str, ...]) -> None:
-    model = Model(terms, coulomb_speed=0.3, stribeck_speed=0.4)
-    c, still, step = _constants(model), np.zeros((2, 1)), 1e-6
-    both = [torque(model, c, Motion(still, still + sign * step, still)) for sign in (1, -1)]
-    np.testing.assert_allclose(damping(model, c), (both[0] - both[1])[:, 0] / (2 * step), atol=1e-8)
