@@ -284,11 +284,12 @@ def opened(problem: Problem) -> list[LogEvidence]:
 
 def _digitisation(kept: Sequence[Segment]) -> NoiseLevels:
     """Noise of digitisation alone: step / √12 of angles and torques, and floating point's own."""
-    theta = np.concatenate([piece.theta for piece in kept[:2]], axis=1)
-    tau = np.concatenate([piece.tau for piece in kept[:2]], axis=1)
-    least_theta = np.maximum(quantum(theta) / np.sqrt(12), _FINEST * np.abs(theta).max() + 1e-300)
-    least_tau = np.maximum(quantum(tau) / np.sqrt(12), 10 * _FINEST * np.abs(tau).max() + 1e-300)
-    return NoiseLevels(least_theta, least_tau)
+    least = []
+    for name, finest in (("theta", _FINEST), ("tau", 10 * _FINEST)):
+        signal = np.concatenate([getattr(piece, name) for piece in kept[:2]], axis=1)
+        rounding = finest * np.abs(signal).max() + 1e-300
+        least.append(np.maximum(quantum(signal) / np.sqrt(12), rounding))
+    return NoiseLevels(*least)
 
 
 class _Gathered:

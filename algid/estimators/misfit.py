@@ -359,8 +359,6 @@ def misfit(
 
 def _score(M: FloatArray, b: FloatArray, own: NDArray[np.int64]) -> tuple[int, float]:
     """Rank and statistic of the score along the torques `own`."""
-    size = np.sqrt(np.diag(M)[own])
-    values, vectors = np.linalg.eigh(M[np.ix_(own, own)] / np.outer(size, size))
-    kept = values > _ALIKE * values.max(initial=0.0)
-    along = vectors[:, kept].T @ (b[own] / size)
-    return int(kept.sum()), float(along @ (along / values[kept]))
+    along, among = b[own], M[np.ix_(own, own)]
+    inverse = scaled_pinv(among, _ALIKE)
+    return round(float(np.sum(inverse * among))), float(along @ inverse @ along)
