@@ -231,7 +231,8 @@ def test_the_page_says_what_the_json_holds_and_draws_the_trajectory(folder: Path
         )
     least = max(told["parameters"], key=lambda name: told["parameters"][name]["relative"])
     for words in (
-        f"{least} is the least certain", f"{limits[1][0][0]} of {limits[1][0][6]} (",
+        f"{least} is the least certain", ">Numbers<", ">Information by time<",
+        "active limit: {0} of {6} ({3} %)".format(*limits[1][0]),
         "1 unloaded run and 1 loaded run together", "the worst of 20 drawn", "A margin of 5.0 %",
         "2.000 s under position control · logged at 500.0 Hz · prior case1",
         "is the space around the arm free?", "payload of 0.35", "the red one its limit",
@@ -240,10 +241,11 @@ def test_the_page_says_what_the_json_holds_and_draws_the_trajectory(folder: Path
         assert words in page.text
     table = pl.read_csv(folder / "trajectory.csv")
     drawn = page.figures["motion"]
-    names = [
-        f"{name}{joint}" for name in ("theta", "omega", "tau", "loaded_tau") for joint in (1, 2)
-    ]
-    for trace, name in zip(drawn["data"], names, strict=True):
+    names = ["t"]
+    for name in ("theta", "omega", "alpha", "tau", "loaded_tau"):
+        names += f"{name}1", f"{name}2"
+    assert table.columns == names
+    for trace, name in zip(drawn["data"], names[1:5] + names[7:], strict=True):
         np.testing.assert_allclose(typed(trace["x"]), np.arange(1001) / 500, rtol=1e-5)
         np.testing.assert_allclose(typed(trace["y"]), table[name], rtol=1e-5, atol=1e-6)
     lines = [shape["y0"] for shape in drawn["layout"]["shapes"]]

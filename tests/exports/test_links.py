@@ -66,22 +66,6 @@ def test_every_possible_arm_gets_possible_links(
     np.testing.assert_allclose(constants_of(links, 0, arm), k, rtol=0, atol=1e-9 * np.abs(k).max())
 
 
-@pytest.mark.parametrize("name", ["m1", "m2"])
-def test_what_is_given_stands_and_the_rest_still_moves_as_identified(name: str) -> None:
-    given_mass = {"m1": 1.7, "m2": 0.75}[name]
-    links = links_of(values_of(ODD), 9.81, ODD.l1, {name: given_mass} | {"rotor1": 0.01}, "arm")
-    assert {"m1": links[0], "m2": links[1]}[name].mass == given_mass
-    np.testing.assert_allclose(constants_of(links, 0.01, ODD), ODD.constants(), rtol=1e-12)
-    (first, second), true = (
-        links_of(values_of(ODD), 9.81, ODD.l1, {"m1": 2.0, "m2": 0.7}, "arm"),
-        ODD,
-    )
-    np.testing.assert_allclose(
-        (first.centre, second.centre, first.inertia, second.inertia),
-        (true.lc1, true.lc2, true.I1, true.I2),
-    )
-
-
 def test_nearest_is_nearest() -> None:
     """The masses chosen have less divergence, by its definition from the matrices, than all others
     on a grid.

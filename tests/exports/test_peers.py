@@ -127,20 +127,6 @@ def test_bent_links_in_a_plane_and_of_a_length_that_is_given() -> None:
     assert_close(by_mujoco(text), wanted(dict(found.value), BENT), CLOSE)
 
 
-def test_mujoco_slides_against_coulomb_friction() -> None:
-    mujoco = pytest.importorskip("mujoco")
-    value = values_of(ODD, f1=0.4, f2=0.3)
-    text = text_of("mjcf", value, Model(("coulomb",)))
-    assert "as a jump at standstill" in text
-    model = mujoco.MjModel.from_xml_string(text)
-    np.testing.assert_array_equal(model.dof_frictionloss, [0.4, 0.3])
-    data = mujoco.MjData(model)
-    data.qvel[:] = (3.0, -2.0)
-    mujoco.mj_forward(model, data)
-    # MuJoCo's contact solver
-    np.testing.assert_allclose(data.qfrc_constraint, [-0.4, 0.3], rtol=1e-3)
-
-
 SETS = [
     Model(),
     Model(("coulomb",)),

@@ -1,5 +1,5 @@
 """What is found of a fleet: by hand with weighted least squares and scipy's distributions at each
-limit, and on simulated fleets, where drift is found and nothing else is.
+limit, and on simulated fleets, where nothing is found that is not there.
 """
 
 from __future__ import annotations
@@ -171,18 +171,6 @@ def test_logs_that_scatter_as_much_as_each_other_are_no_outliers(
     assert not history_in(tmp_path, table(values)).findings.filter(kind="outlier").height
 
 
-@pytest.mark.parametrize(("payload", "told"), [(0.50492, False), (0.50494, True), (0.49506, True)])
-def test_a_label_is_wrong_once_in_a_million(payload: float, told: bool, tmp_path: Path) -> None:
-    jobs = table(
-        [1.0] * 5, m_p=[0.5, 0.5, payload, 0.5, 0.5], m_p_std=[0.001] * 5, label_payload=[0.5] * 5
-    )
-    found = history_in(tmp_path, jobs).findings.filter(kind="payload")
-    assert found["job"].to_list() == ["j2"] * told
-    if told:
-        assert found.select("parameter", "value", "expected").row(0) == ("m_p", payload, 0.5)
-        assert found["sigmas"][0] == pytest.approx((payload - 0.5) / 0.001, rel=1e-9)
-
-
 def test_drifts_are_the_latest_of_each_robot_and_the_clearest_comes_first(tmp_path: Path) -> None:
     days = 100
     faint = [1 + 0.04 * (day % 2) + 0.0009 * day for day in range(days)]
@@ -297,25 +285,11 @@ def fleet(
     return pl.DataFrame(columns)
 
 
-def test_growth_of_a_percent_a_month_is_found_within_three_months(tmp_path: Path) -> None:
-    history = history_in(tmp_path, fleet(20, 92, seed=1, growth=0.01))
-    found = history.findings.filter(kind="drift", parameter="k6")
-    assert found["robot"].n_unique() == 20
-    assert found["value"].to_numpy() == pytest.approx(
-        0.01, abs=2.6 * float(found["half"].to_numpy().max())
-    )
-
-
 @pytest.mark.parametrize("scatter", [1.0, 3.0])
 def test_false_alarms_stay_below_one_a_robot_year(tmp_path: Path, scatter: float) -> None:
     history = history_in(tmp_path, fleet(100, 365, seed=2, scatter=scatter))
     # 100 robots a year, 0.084 expected each: Poisson(8.4) passes 25 with probability 1e-6.
     assert history.windows["drift"].sum() <= 25
-
-
-def payloads(values: list[float], std: float = 0.001) -> pl.DataFrame:
-    jobs = fleet(1, len(values), seed=6)
-    return jobs.with_columns(m_p=pl.Series(values), m_p_std=pl.lit(std), label_payload=pl.lit(0.5))
 
 
 @pytest.mark.parametrize(
@@ -330,13 +304,23 @@ def payloads(values: list[float], std: float = 0.001) -> pl.DataFrame:
         ([0.9, 0.9002], ["j0", "j1"]),
         ([0.504, 0.496], []),
         ([0.5, 0.47, 0.53, 0.48, 0.52, 0.51], []),  # their own scatter is what they are judged by
+        # one of a million
+        ([0.5, 0.5, 0.50492, 0.5, 0.5], []),
+        ([0.5, 0.5, 0.50494, 0.5, 0.5], ["j2"]),
+        ([0.5, 0.5, 0.49506, 0.5, 0.5], ["j2"]),
     ],
 )
 def test_a_wrong_label_is_found_however_few_the_logs(
     values: list[float], wrong: list[str], tmp_path: Path
 ) -> None:
-    findings = history_in(tmp_path, payloads(values)).findings
-    assert sorted(findings.filter(kind="payload")["job"]) == wrong
+    count = len(values)
+    told = {"m_p": values, "m_p_std": [0.001] * count, "label_payload": [0.5] * count}
+    found = history_in(tmp_path, table([1.0] * count, **told)).findings.filter(kind="payload")
+    assert sorted(found["job"]) == wrong
+    for one in found.rows(named=True):
+        assert (one["parameter"], one["expected"]) == ("m_p", 0.5)
+        assert one["value"] == values[int(one["job"][1:])]
+        assert one["sigmas"] == pytest.approx((one["value"] - 0.5) / 0.001, rel=1e-9)
 
 
 def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: Path) -> None:

@@ -58,12 +58,6 @@ def test_they_are_lost_data_and_used_where_that_is_accepted() -> None:
     assert told(accepted) == []
 
 
-def test_a_sound_log_loses_nothing() -> None:
-    survey = surveyed(moving_log())
-    assert sum(map(len, survey.segments(survey.logs[0]))) == 6000
-    assert told(survey) == []
-
-
 def test_an_external_torque_is_not_judged() -> None:
     assert saturation(cut_off(), effort="external").limits == ()
     log = moving_log()

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from algid.arm import FloatArray
 from algid.inspection.conventions import judged, mend
 from algid.log import Log
 from algid.notices import Notice
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
 from algid.writers import write_log
+from pipelines.conventions import SPOILS, Spoil
 from tests.inspection.test_checks import moving_log
 
 RIGHT = moving_log()
@@ -28,59 +28,38 @@ def mended(log: Log) -> Notice | None:
     return mend(log.origin, judged(log))
 
 
-def written(path: Path, theta: FloatArray, tau: FloatArray) -> Path:
-    write_log(path, replace(RIGHT, theta=theta, tau=tau, omega=None))
+WRONG: dict[str, Spoil] = {
+    "all signs": SPOILS["all signs"],
+    "joints swapped": SPOILS["joints swapped"],
+    "torques swapped": SPOILS["torques swapped"],
+    "joint 1 from behind, hanging": lambda a, b, s, t: (-a - np.pi / 2, b, -s, t),
+    "absolute, hanging": lambda a, b, s, t: (a + np.pi / 2, a + b + np.pi / 2, s, t),
+    "base, tau2 reversed": lambda a, b, s, t: (a, b, s - t, -t),
+    "motor": lambda a, b, s, t: (9.6 * a, b, s, t),
+    "zero of joint 2, absolute, reversed": lambda a, b, s, t: (a, -(a + b) - 0.5, s, -t),
+    # within what reads as rad
+    "degrees": lambda a, b, s, t: (np.degrees(a) / 20, np.degrees(b) / 20, s, t),
+}
+
+
+def recorded(path: Path, name: str) -> Path:
+    """The log with that mistake."""
+    spoil = WRONG.get(name, SPOILS["nothing"])
+    signals = np.stack(spoil(*RIGHT.theta, *RIGHT.tau))
+    write_log(path, replace(RIGHT, theta=signals[:2], tau=signals[2:], omega=None))
     return path
-
-
-def recorded(name: str) -> tuple[FloatArray, FloatArray]:
-    (a, b), (p, q) = RIGHT.theta, RIGHT.tau
-    match name:
-        case "all signs":
-            return -RIGHT.theta, -RIGHT.tau
-        case "joint 1 from behind, hanging":
-            return np.stack([-a - np.pi / 2, b]), np.stack([-p, q])
-        case "absolute, hanging":
-            return np.stack([a + np.pi / 2, a + b + np.pi / 2]), RIGHT.tau
-        case "right":
-            return RIGHT.theta, RIGHT.tau
-        case "swapped":
-            return RIGHT.theta[::-1], RIGHT.tau[::-1]
-        case "torques swapped":
-            return RIGHT.theta, RIGHT.tau[::-1]
-        case "base, tau2 reversed":
-            return RIGHT.theta, np.stack([p - q, -q])
-        case "motor":
-            return np.stack([9.6 * a, b]), RIGHT.tau
-        case "zero of joint 2, absolute, reversed":
-            return np.stack([a, -(a + b) - 0.5]), np.stack([p, -q])
-        case _:
-            return np.degrees(RIGHT.theta) / 20, RIGHT.tau  # within what reads as rad
-
-
-ROWS = (
-    "all signs",
-    "joint 1 from behind, hanging",
-    "absolute, hanging",
-    "swapped",
-    "torques swapped",
-    "base, tau2 reversed",
-    "motor",
-    "zero of joint 2, absolute, reversed",
-    "degrees",
-)
 
 
 @pytest.mark.parametrize(
     ("row", "kind"),
     [
-        *((row, "csv") for row in ROWS),
-        ("swapped", "mcap"),
+        *((row, "csv") for row in WRONG),
+        ("joints swapped", "mcap"),
         ("torques swapped", "mcap"),
     ],
 )
 def test_the_settings_named_mend_the_log(row: str, kind: str, tmp_path: Path) -> None:
-    path = written(tmp_path / f"arm.{kind}", *recorded(row))
+    path = recorded(tmp_path / f"arm.{kind}", row)
     found = mended(read_log(path))
     assert found is not None
     log = read_log(path, with_settings(Profile(), found.remedies[0].settings))
@@ -110,7 +89,7 @@ def test_the_settings_named_mend_the_log(row: str, kind: str, tmp_path: Path) ->
 def test_settings_change_what_a_profile_said(
     row: str, wrong: dict[str, Any], tmp_path: Path
 ) -> None:
-    path = written(tmp_path / "arm.csv", *recorded(row))
+    path = recorded(tmp_path / "arm.csv", row)
     profile = with_settings(Profile(), wrong)
     found = mended(read_log(path, profile))
     assert found is not None

@@ -5,7 +5,6 @@ from __future__ import annotations
 from algid.notices import Notice, Remedy, Verdict
 from algid.report.terminal import WIDTH, brief, verdict_lines
 from algid.results import Result
-from algid.results.model import TorqueModel
 
 MOST = 28
 """Lines: a verdict of three, three reasons of two each, a row an estimate, terms and notes."""
@@ -58,16 +57,3 @@ def test_the_command_to_run_first_is_one_line_to_be_copied() -> None:
     for command, said in ((None, ": --zero hanging"), ("algid identify", "")):
         judged = Verdict("failed", "it failed", (reason,), command=command)
         assert verdict_lines(judged, most=1)[1] == f" • wrong by physics: zero{said} [WRONG]"
-
-
-def test_the_terms_are_named(result: Result) -> None:
-    assert result.fit is not None
-    terms = ["coulomb", "offset", "stribeck", "load"]
-    for own, text in (([], "Optional torque terms: none"), (terms, "coulomb, offset, stribeck")):
-        model = TorqueModel(terms=own, coulomb_speed=0.1, stribeck_speed=0.1, chosen_by="logs")
-        fit = result.fit.model_copy(update={"model": model})
-        many = {f"f{number}": result.parameters["k1"] for number in range(20 if own else 0)}
-        found = {"fit": fit, "parameters": result.parameters | many}
-        lines = shown(result.model_copy(update=found))
-        assert text in lines
-        assert ("(f0 8.1" in lines) == bool(own)

@@ -210,15 +210,6 @@ def test_a_bare_result_still_makes_a_page(tmp_path: Path, result: Result) -> Non
         write_pages(tmp_path)
 
 
-def test_no_status_of_a_failed_result_is_good(folder: Path, result: Result) -> None:
-    poor = result.parameters["k1"].model_copy(update={"status": Status.NOT_CONVERGED})
-    good = written(folder, result)
-    assert good.text.count("status whole ok") >= len(result.parameters)
-    failed = written(folder, result.model_copy(update={"parameters": {"k1": poor}}))
-    assert 'class="verdict failed"' in failed.text
-    assert "whole ok" not in failed.text
-
-
 def test_markdown_has_every_table_and_a_command_that_can_be_copied() -> None:
     command = "algid identify 'a `b` ```c```.csv' --force"
     failed = Verdict("failed", "it failed", command=command)
