@@ -28,8 +28,9 @@ class FileLimits:
     """Cells that are taken of a column of lists or a matrix; a joint has one."""
     whole_bytes: int = 1 << 30
     """Of a file that is read as a whole: NumPy, MATLAB, HDF5, JSON lines."""
-    reserved_rows: int = 1 << 26
-    """Rows to reserve memory for on a file's word alone."""
+    reserved_rows: int = 1 << 24
+    """Rows to reserve memory for on a file's word alone, 0.9 GiB of seven columns; beyond that a
+    log's arrays grow with it."""
     largest_value: float = 1e30
     """A larger value is no angle or torque; its eighth power, in covariances, is a double."""
     largest_time_ns: float = 9.2e18

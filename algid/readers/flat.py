@@ -77,6 +77,12 @@ def offer_table(table: TableFile, profile: Profile) -> Offered:
         for key, text in table.metadata.items()
         if not (key in table.schema.names and object_in(text))  # of the column alone
     }
+    gone = [name for name in table.companion.sums if name not in cells]
+    if gone:
+        raise LogError(
+            f"the columns {', '.join(gone)} that were written are not there: the file was "
+            "changed or damaged; write it again, or remove its truth if it was changed on purpose"
+        )
     by_user = {name: profile.channel(name).column for name in profile.channels}
     by_user["t"] = profile.time
     index = cells.get(INDEX)

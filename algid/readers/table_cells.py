@@ -363,7 +363,11 @@ def groups_in(table: TableFile) -> Iterator[Notice]:
 
     for one in table.schema:
         if one.name.lower() in GROUPS and not pa.types.is_nested(one.type):
-            found = set(_values(table, one.name))
+            found: set[object] = set()
+            for value in _values(table, one.name):
+                found.add(value)
+                if len(found) > LIMITS.joints:
+                    break
             if len(found) > 1:
                 yield several(one.name, found)
 

@@ -4,13 +4,19 @@ motors and units.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from algid.base.errors import LogError
+from algid.log import Companion
 from algid.notices import Notice
+from algid.profile import Profile
+from algid.readers.arrays import of_arrays
 from algid.readers.column_names import Name, take_apart
+from algid.readers.flat import offer_table
 from tests.readers.headers import TableReader, opened
 
 PLAIN = "t q1 q2 tau1 tau2"
@@ -60,6 +66,15 @@ def test_two_of_numbered_joints_are_called_by_number_word_or_column(forms: str, 
         joints = [called.format(first + 2), called.format(first + 1)]
         assert chosen(columns, joints=joints) == {"t": "t", **wanted}
     assert "there are: " in refused(columns, {"joints": ["8", "9"]})
+
+
+def test_columns_that_were_written_must_be_there() -> None:
+    table = of_arrays("arrays", {name: np.arange(3.0) for name in PLAIN.split()[:-1]})
+    sums = dict.fromkeys(("tau2", "tau1", "omega1"), 0)
+    with pytest.raises(
+        LogError, match="the columns tau2, omega1 that were written are not there: the file was"
+    ):
+        offer_table(replace(table, companion=Companion(None, sums)), Profile())
 
 
 @pytest.mark.parametrize("passive", [1, 2])
