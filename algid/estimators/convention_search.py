@@ -252,21 +252,18 @@ def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgeme
 
 def _judged(candidates: Sequence[Candidate], trials: Trials) -> Judgement:
     as_read = next(one for one in candidates if one.convention == AS_READ)
-    best = None
-    for candidate in sorted(candidates, key=lambda one: one.score):
-        if candidate.broken:
-            continue
-        if best is None:
-            best = candidate
-        elif best.balanced and candidate.convention == best.other_side:
-            # of two sides that explain the same, but for rounding, the log's own
-            best = min(best, candidate, key=lambda one: abs(one.zero[1]))
-        elif candidate.convention != best.convention:  # the log as read is among them twice
-            alone = best.convincing and candidate.score - best.score > trials.apart
-            return Judgement(as_read, best, alone, trials)
-    if best is None:
+    lawful = sorted((one for one in candidates if not one.broken), key=lambda one: one.score)
+    if not lawful:
         return Judgement(as_read, as_read, False, trials)
-    return Judgement(as_read, best, best.convincing, trials)
+    # of two sides that explain the same, but for rounding, the log's own
+    sides = [lawful[0].convention]
+    if lawful[0].balanced:
+        sides.append(lawful[0].other_side)
+    nearest = min((one.score for one in lawful if one.convention not in sides), default=np.inf)
+    same = [one for one in lawful if one.convention in sides and one.score <= nearest]
+    best = min(same, key=lambda one: abs(one.zero[1]))
+    alone = best.convincing and nearest - best.score > trials.apart
+    return Judgement(as_read, best, alone, trials)
 
 
 def seconds_of_each(count: int, longest: float = _FINE[1]) -> float:

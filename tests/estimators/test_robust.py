@@ -188,12 +188,10 @@ def test_a_likelihood_beside_shapes_is_that_of_least_squares_with_their_prior() 
     X[:, 5] /= np.sqrt(np.mean(X[:, 5] ** 2, axis=1, keepdims=True))  # so that rows weigh one
     normal = weak.Normal(weak.grams(X, 8), 0.01, 40, np.array([40.0, 40.0]), np.ones(2))
     found = _marginal(weak.evidence(normal.gram, normal.rows, np.zeros(5), False), normal, 3)
-    torque, size = (np.sqrt(np.mean(X[[0, 1], own] ** 2, axis=1)) for own in (5, [3, 4]))
-    known = np.zeros((2, 5))
-    known[:, 3:] = np.diag(size / (BESIDE * torque))
-    rows = np.concatenate(
-        [*(np.sqrt(2 / OVERLAP) * X.swapaxes(1, 2)), np.pad(known, ((0, 0), (0, 1)))]
-    )
+    rows = np.sqrt(2 / OVERLAP) * np.concatenate(list(X.swapaxes(1, 2)))
+    size = np.sqrt([np.mean(X[0, 3] ** 2), np.mean(X[1, 4] ** 2)])
+    known = np.pad(np.diag(size / BESIDE), ((0, 0), (3, 1)))
+    rows = np.concatenate([rows, known])
     S = np.linalg.inv(rows[:, :5].T @ rows[:, :5])
     np.testing.assert_allclose(np.linalg.inv(found.total[0]), S[:3, :3], rtol=1e-9)
     estimate = np.linalg.solve(*found.total)
