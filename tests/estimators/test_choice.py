@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import algid
 from algid.estimators.problem import WeakSettings
 from algid.estimators.terms import CHOICE, Selection, select
 from algid.identification.identify import identify
 from algid.model import RIGID, Model
 from algid.signals.segments import Segment
+from algid.synth.sensors import Sensors
 from pipelines import elastic
 from tests.estimators.conftest import Bench, problem_of
 from tests.estimators.test_terms import term_log, term_values
@@ -60,6 +62,15 @@ def test_terms_that_physics_does_not_allow_or_that_need_another_are_left_out(ben
     asked = _of(pushed, candidates=("coulomb",), kept=("coulomb",))
     assert asked.model.terms == ("coulomb",)
     assert asked.trials[0].reason == "asked for"
+
+
+def test_what_sampling_makes_of_a_log_without_noise_is_no_term() -> None:
+    """Six terms are evident in it, a delay first."""
+    exact, _ = algid.synthesise("case1", duration=4.0, torque="wide", sensors=Sensors())
+    chosen = _of(Segment(0.0, 1e-3, exact.theta, exact.tau))
+    assert (chosen.model.terms, chosen.delay, chosen.refuted) == ((), False, False)
+    reasons = {trial.term: trial.reason for trial in chosen.trials}
+    assert reasons["delay"] == "left out: explains less than sampling leaves open"
 
 
 @pytest.mark.parametrize("samples", [6, -6], ids=["late", "early"])
