@@ -174,7 +174,6 @@ def identify(
 
 def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier | None) -> Settings:
     """The settings, completed from the profile or an earlier result where they are not set."""
-    stated: dict[str, Any] = {}
     names: tuple[str, ...] = (*OF_BOTH, *OF_PRIOR)
     if earlier is not None:
         if settings.prior is not None:
@@ -183,12 +182,9 @@ def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier 
             )
         names = OF_BOTH
     if meaning is not None:
-        for name in meaning.model_fields_set.intersection(names):
-            stated[name] = getattr(meaning, name)
-    set_by_user = {name for name in stated if getattr(settings, name) != DEFAULTS[name]}
-    for name in set_by_user:
-        del stated[name]
-    settings = settings.but(**stated)
+        unset = {name for name in names if getattr(settings, name) == DEFAULTS[name]}
+        stated = meaning.model_fields_set & unset
+        settings = settings.but(**{name: getattr(meaning, name) for name in stated})
     if settings.prior_error is not None and settings.prior is None:
         raise SettingError(
             f"{flag('prior_error')}: expected a prior that errs by as much, found none; give "

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import sympy as sp
 
 from algid.arm import FloatArray
 from algid.estimators.modulating_functions import Windows
 from algid.model import EVERY_TERM, TERMS, Model, Motion, partials, regressor, torque
 from algid.physics.effort import Effort, absent, without_terms
-from algid.physics.expressions import Expression, Values
+from algid.physics.expressions import Values
 from algid.physics.motion import Widths
 from algid.physics.signals import C12, S1, W2
 from algid.physics.terms import ALWAYS, OPTIONAL
@@ -23,7 +22,6 @@ from tests.estimators.test_model import VALUES
 from tests.exports.test_peers import compiled, each, text_of
 
 DT = 1e-3
-COLUMNS = [term.name for term in (*ALWAYS, *OPTIONAL) if term.columns and not term.elastic]
 IN_MODELS = [*(term.name for term in ALWAYS), *TERMS]
 
 
@@ -97,48 +95,6 @@ def test_the_c_source_is_the_torque(term: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(
         found, torque(model, constants(model), motion), rtol=1e-12, atol=1e-12
     )
-
-
-@pytest.mark.parametrize("term", COLUMNS)
-def test_the_form_is_the_column(term: str) -> None:
-    """SymPy derives s twice and p once along a motion, and finds the regressor."""
-    model = Model((term,) if term in TERMS else (), coulomb_speed=0.5, stribeck_speed=0.8)
-    motion, t = moving(0.05), sp.Symbol("t")
-    angles = [sp.Function(f"angle{joint}")(t) for joint in (1, 2)]
-    Y = regressor(model, motion)
-    for column in EVERY_TERM[term].columns:
-        for joint in range(2):
-            s, p, f = (
-                _by_sympy(getattr(column, part)[joint], angles, model) for part in ("s", "p", "f")
-            )
-            expected = _along(sp.diff(s, t, 2) + sp.diff(p, t) + f, angles, motion)
-            np.testing.assert_allclose(
-                Y[joint, model.names.index(column.parameter)], expected, atol=1e-11
-            )
-
-
-def _by_sympy(expression: Expression, angles: list[sp.Expr], model: Model) -> sp.Expr:
-    """The expression in SymPy's symbols, read from its atoms' source text."""
-    t = sp.Symbol("t")
-    names = {"q1": angles[0], "q2": angles[1], "w1": angles[0].diff(t), "w2": angles[1].diff(t)}
-    names |= {"COULOMB_SPEED": model.coulomb_speed, "STRIBECK_SPEED": model.stribeck_speed}
-    total = sp.Integer(0)
-    for product, factor in expression.products.items():
-        parts = [sp.sympify(atom.source or atom.name, locals=names) for atom in product]
-        total += factor * sp.Mul(*parts)
-    return total
-
-
-def _along(expression: sp.Expr, angles: list[sp.Expr], motion: Motion) -> FloatArray:
-    """The expression's values (N,) along a motion."""
-    t, known = sp.Symbol("t"), {}
-    for order, signal in ((2, motion.alpha), (1, motion.omega), (0, motion.theta)):
-        for joint, angle in enumerate(angles):
-            symbol = sp.Symbol(f"x{order}{joint}")
-            expression = expression.subs(angle.diff(t, order) if order else angle, symbol)
-            known[symbol] = signal[joint]
-    found = sp.lambdify(list(known), expression, "numpy")(*known.values())
-    return np.broadcast_to(np.asarray(found, dtype=np.float64), motion.theta.shape[1:])
 
 
 def test_every_parameter_says_what_it_is() -> None:

@@ -116,16 +116,6 @@ def test_few_blocks_of_white_rows_have_no_excess_by_chance(pairs: int, robust: b
     assert false <= binom.isf(1e-3, count, CHANCE)
 
 
-@pytest.mark.parametrize("step", [0.0, 1.0])
-def test_edges_of_a_simulated_log_are_its_own(step: float) -> None:
-    rng = np.random.default_rng(5)
-    cells = cells_of(np.repeat([0.0, step, 0.0], [90, 60, 75]), rng)
-    found, drift, variance = first_segmentation(cells)
-    assert not drift.phi.any()
-    assert variance == pytest.approx(1.0, abs=0.1)
-    assert found == pytest.approx([0, 90, 150, 225] if step else [0, 225], abs=1)
-
-
 def test_changes_each_second_hide_behind_no_error_of_their_own() -> None:
     """Most blocks of a second hold one; blocks within stretches do not."""
     rng = np.random.default_rng(9)
