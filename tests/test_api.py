@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import polars as pl
-import pyarrow as pa
 import pytest
 
 import algid
@@ -321,73 +320,6 @@ def columns() -> dict[str, Any]:
     return {"time": log.t, **angles, "tau1": log.tau[0], "tau2": log.tau[1]}
 
 
-def _pandas(columns: dict[str, Any]) -> object:
-    return pytest.importorskip("pandas").DataFrame(columns)
-
-
-def _pandas_by_time(columns: dict[str, Any]) -> object:
-    return pytest.importorskip("pandas").DataFrame(columns).set_index("time")
-
-
-def _lists(columns: dict[str, Any]) -> object:
-    frame = pl.DataFrame(columns)
-    return frame.select("time", *frame.columns[1:3], tau=pl.concat_list("tau1", "tau2"))
-
-
-@pytest.mark.parametrize("made", [dict, pl.DataFrame, pa.table, _lists, _pandas, _pandas_by_time])
-def test_columns_in_memory_are_read_as_a_file_of_them(
-    made: Callable[[dict[str, Any]], object], columns: dict[str, Any], tmp_path: Path
-) -> None:
-    pl.DataFrame(columns).write_parquet(tmp_path / "log.parquet")
-    of_file = algid.identify(tmp_path / "log.parquet", settings=WEAK)
-    found = algid.identify(made(columns), settings=WEAK)
-    assert found.parameters == of_file.parameters
-    assert found.payload == of_file.payload
-    assert found.log.reading == of_file.log.reading or made is _lists
-    assert [notice.code for notice in found.notices] == [notice.code for notice in of_file.notices]
-
-
-@pytest.mark.parametrize(
-    ("changes", "expected"),
-    [
-        ({"tau2": "a"}, "^log: column 'tau2' for tau2 holds string_view; expected numbers$"),
-        ({"tau2": None}, "^log: column 'tau2' for tau2 holds null; expected numbers$"),
-        ({"theta1 [deg]": float("nan")}, "^log: theta1 .* expected a finite number"),
-    ],
-)
-def test_a_frame_that_is_no_log_is_refused(
-    columns: dict[str, Any], changes: dict[str, Any], expected: str
-) -> None:
-    frame = pl.DataFrame(columns).with_columns(
-        **{name: pl.lit(value) for name, value in changes.items()}
-    )
-    with pytest.raises(LogError, match=expected):
-        algid.identify(frame, settings=WEAK)
-
-
-@pytest.mark.parametrize(
-    ("given", "expected"),
-    [
-        ({}, "^log: no arrays of two samples or more; found nothing$"),
-        (
-            {"t": [0.0, 0.1], "q": [[1.0], [1.0, 2.0]]},
-            "^log: 'q' is no array .*; give numbers of one shape$",
-        ),
-        (
-            {"t": [0.0, 0.1, 0.2], "q1": [1.0, 2.0]},
-            r"the log also holds, of another length: q1 \(2\);",
-        ),
-        (
-            {"t": [0.0, 0.1]},
-            "^log: no column for theta1, theta2, tau1, tau2; found 't'; name them: ",
-        ),
-    ],
-)
-def test_a_dict_that_is_no_log_is_refused(given: dict[str, Any], expected: str) -> None:
-    with pytest.raises(LogError, match=expected):
-        algid.identify(given, settings=WEAK)
-
-
 @pytest.mark.parametrize("given", [42, np.zeros((2, 9)), [np.zeros(9)], [None], b"log.csv"])
 @pytest.mark.parametrize("verb", [algid.identify, algid.inspect])
 def test_what_is_no_log_is_refused(verb: Callable[[Any], object], given: object) -> None:
@@ -395,6 +327,8 @@ def test_what_is_no_log_is_refused(verb: Callable[[Any], object], given: object)
         LogError, match="expected a path, a Log, a frame or a dict of arrays, found"
     ):
         verb(given)
+    with pytest.raises(LogError, match=r"^log: 'q' is no array .*; give numbers of one shape$"):
+        algid.identify({"t": [0.0, 0.1], "q": [[1.0], [1.0, 2.0]]})
 
 
 def test_a_profile_is_given_in_any_form_and_its_settings_as_keywords(

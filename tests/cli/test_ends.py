@@ -153,17 +153,6 @@ def test_a_batch_beside_an_arms_result_takes_its_logs_for_loaded_ones(
     assert found.estimate == pytest.approx(0.3515, rel=0.05)
 
 
-def test_a_profile_that_is_there_is_refused_before_the_log_is_read(tmp_path: Path) -> None:
-    (tmp_path / "algid.toml").touch()
-    done = call("inspect", tmp_path / "absent.csv", "--write-profile", tmp_path)
-    assert (done.code, done.out) == (2, "")
-    assert "algid.toml: exists already" in done.err
-    log, new = tmp_path / "log.csv", tmp_path / "new.toml"
-    log.write_text("t,a\n0,1\n1,2\n")  # which nothing reads without a profile
-    done = call("inspect", log, "--write-profile", new)
-    assert (done.code, done.err) == (0, f"wrote {new}; edit it, then give it by --profile\n")
-
-
 SHORT = ("--format", "csv", "--rate", "200", "--duration", "0.5")
 
 

@@ -129,19 +129,6 @@ def test_what_is_not_finished_is_not_read(tmp_path: Path) -> None:
     assert found["t"].to_numpy() == pytest.approx([0, 2 / MONTH], rel=1e-12)
 
 
-@pytest.mark.parametrize("value", [1e308, 1e-200, math.nan])
-@pytest.mark.parametrize("column", ["k1", "k1_std", "label_payload"])
-def test_numbers_beyond_all_bounds_are_no_estimates(
-    column: str, value: float, tmp_path: Path
-) -> None:
-    jobs = table([1.0] * 12, m_p=[0.5] * 12, m_p_std=[0.1] * 12, label_payload=[0.5] * 12)
-    changed = pl.when(pl.col("job") == "j3").then(pl.lit(value)).otherwise(column).alias(column)
-    history = history_in(tmp_path, jobs.with_columns(changed))
-    assert history.jobs.filter(job="j3")[column].to_list() == [None]
-    assert not history.findings.filter(kind="step").height
-    json.loads(history.as_json())
-
-
 # where half the logs are the median itself the scatter is the intervals' own, never less
 AS_TOLD = [0.0] * 7
 # deviations of 3 to both sides: 1.4826 times them is one robust deviation; scipy has more digits

@@ -48,16 +48,6 @@ def test_inspect_tells_what_a_log_is(kind: str, tmp_path: Path) -> None:
     }
 
 
-def test_inspect_works_on_what_it_refuses(tmp_path: Path) -> None:
-    path = tmp_path / "arm.csv"
-    path.write_text("time,<b>a\x1b[31m</b>,q2\n0,1,2\n1,2,3\n".replace("\x1b", "\u0085"))
-    text = run("inspect", path, code=2)
-    assert "refused" in text
-    assert "\u0085" not in text
-    content = json.loads(run("inspect", path, "--format", "json", code=2))
-    assert content["entries"][2]["name"] == "q2"
-
-
 def test_inspect_and_convert_of_a_cut_file_exit_with_4(tmp_path: Path) -> None:
     write_log(tmp_path / "arm.mcap", moving_log(60_000))
     content = (tmp_path / "arm.mcap").read_bytes()
