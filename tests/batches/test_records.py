@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -185,5 +185,7 @@ def test_the_table_is_written_for_changes_alone_and_touched_logs_run_again(logs:
     os.utime(logs / "a.csv", ns=(0, 10**18))
     assert batch.run(jobs).anew == {"of other logs": 1}
     (out / "jobs.parquet").unlink()
-    assert batch.run(jobs).ran == 3
-    assert pl.read_parquet(out / "jobs.parquet")["changed"].to_list()[0][0].year == 2001
+    assert batch.run([replace(job, labels={"site": "Ulm"}) for job in jobs]).ran == 3
+    table = pl.read_parquet(out / "jobs.parquet")
+    assert table["changed"].to_list()[0][0].year == 2001
+    assert table["label_site"].to_list() == ["Ulm"] * 2
