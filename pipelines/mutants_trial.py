@@ -31,6 +31,8 @@ LOADED = (
     "hypothesis", "numpy", "scipy.integrate", "scipy.interpolate", "scipy.linalg",
     "scipy.optimize", "scipy.stats", "pydantic", "jinja2", "click", "plotly.graph_objects",
     "polars", "pyarrow.csv", "pyarrow.fs", "pyarrow.parquet", "rich.progress",
+    # what tests import
+    "click.testing", "h5py", "mcap.writer", "pandas", "rosbags.rosbag2", "ruamel.yaml", "sympy",
 )  # fmt: skip
 SLOWEST = 10  # times the processor time: a mutant that waits longer than that hangs
 MEMORY = 8 << 30  # bytes
