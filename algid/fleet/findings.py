@@ -11,9 +11,11 @@ gain    what two means explain beyond one, by the first log    (N,)
 ======  =====================================================  =======
 
 **Steps.** An arm, a gearbox or a convention that was replaced changes all parameters between the
-same two logs. Without a change the gain at one place follows χ² with P degrees of freedom; the best
-of N places is held against N times that. A slow drift is no change: what a line explains must be
-less. What comes before a change and after it are two stints, tested for drift and outliers apart.
+same two logs. Without a change the gain at one place follows χ² with P degrees of freedom, or a
+times that of P / a, where the parameters of a log err alike, as by a warm motor: a = Σ r² / P, of
+their correlations r from log to log (Box 1954). The best of N places is held against N times that.
+A slow drift is no change: what a line explains must be less. What comes before a change and after
+it are two stints, tested for drift and outliers apart.
 
 **Drifts.** A window is `SPAN` months long and ends with each month, so that a year holds twelve
 tests a parameter. The slope's error is the one that the intervals give, or the larger one that the
@@ -239,7 +241,12 @@ def changes(t: FloatArray, y: FloatArray, w: FloatArray, start: int = 0) -> list
     scale = np.maximum((squares - explained) / freedom, 1.0)
     gain = (explained / scale).sum(axis=0)
     at = BESIDE - 1 + int(gain[BESIDE - 1 : n - BESIDE].argmax())
-    p = (n - 1) * float(gammaincc(len(y) / 2, gain[at] / 2))
+    # how alike parameters err from log to log, as chance alone has them do a little
+    apart = np.diff(np.sqrt(w) * calm)
+    apart /= np.linalg.norm(apart, axis=1, keepdims=True).clip(ROUNDING)
+    alike = ((apart @ apart.T) ** 2).sum() / len(y) - 1.5 * len(y) / n
+    half = 0.5 / max(alike, 1.0)
+    p = (n - 1) * float(gammaincc(half * len(y), half * gain[at]))
     # what a line explains of the same scatter
     off = t - w @ t[:, None] / total
     spread = np.maximum((w * off**2).sum(axis=1), ROUNDING * total[:, 0])

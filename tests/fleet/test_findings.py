@@ -249,11 +249,16 @@ def test_a_step_is_what_two_means_explain_once_in_a_million_lives(
 
 
 def fleet(
-    robots: int, days: int, seed: int, growth: float = 0.0, scatter: float = 1.0
+    robots: int,
+    days: int,
+    seed: int,
+    growth: float = 0.0,
+    scatter: float = 1.0,
+    alike: float = 0.0,
 ) -> pl.DataFrame:
     """One log a day: estimates of 1 ± 0.5 %, scattering `scatter` times as much as they say.
 
-    k6 grows a month.
+    All of a log err by `alike` times that together. k6 grows a month.
     """
     rng = np.random.default_rng(seed)
     rows = robots * days
@@ -265,8 +270,9 @@ def fleet(
         "time": pl.Series([START + timedelta(days=int(one)) for one in day], dtype=STAMP),
         "status": ["ok"] * rows,
     }
+    common = 0.005 * alike * np.random.default_rng(seed + 1).standard_normal(rows)
     for name in NAMES:
-        trend = growth * day / MONTH if name == "k6" else 0.0
+        trend = common + (growth * day / MONTH if name == "k6" else 0.0)
         columns[name] = 1 + trend + scatter * 0.005 * rng.standard_normal(rows)
         columns[f"{name}_std"] = np.full(rows, 0.005)
     return pl.DataFrame(columns)
@@ -342,10 +348,12 @@ def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: P
     assert len(named(plot.data, "mean")) == 4  # no line leads across the change
 
 
-@pytest.mark.parametrize("scatter", [1.0, 3.0])
-def test_no_change_is_seen_where_there_is_none(tmp_path: Path, scatter: float) -> None:
+@pytest.mark.parametrize(("scatter", "alike"), [(1.0, 0.0), (3.0, 0.0), (1.0, 3.0)])
+def test_no_change_is_seen_where_there_is_none(
+    tmp_path: Path, scatter: float, alike: float
+) -> None:
     """200 lives of 90 logs: a share of 1e-6 of false ones is none of them."""
-    history = history_in(tmp_path, fleet(200, 90, seed=21, scatter=scatter))
+    history = history_in(tmp_path, fleet(200, 90, seed=21, scatter=scatter, alike=alike))
     assert not history.findings.filter(kind="step").height
 
 
