@@ -131,7 +131,7 @@ def open_offered(path: str, offered: Offered, profile: Profile) -> TableReader:
         one = fields[source]
         mapping[name] = f"{one.topic}: {one.column}" if one.topic else source
         if not (one.is_number or (name == "t" and one.is_clock)):
-            held = str(one.type)[:80]
+            held = str(one.type).removeprefix("large_").removesuffix("_view")[:80]
             raise LogError(f"column {source!r} for {name} holds {held}; expected numbers")
     notices = list(offered.notices)
     named = all(profile.channel(name).column for name in profile.needed)
