@@ -210,7 +210,7 @@ def standing_out(own: pl.DataFrame, kind: str) -> pl.DataFrame:
     return judged.filter(far.abs() > (CLEAR if kind == "payload" else OUTLYING))
 
 
-def changes(t: FloatArray, y: FloatArray, w: FloatArray, start: int = 0) -> list[int]:
+def changes(t: FloatArray, y: FloatArray, w: FloatArray) -> list[int]:
     """Places of the first logs after changes of one robot; each part is looked at again by itself.
 
     Parameters
@@ -220,8 +220,6 @@ def changes(t: FloatArray, y: FloatArray, w: FloatArray, start: int = 0) -> list
         NaN where there is no estimate.
     w : (P, N) float64
         Weights, 1 / std²; 0 where there is no estimate.
-    start : int
-        The place of the first log.
     """
     n, known = t.size, w.any(axis=1)
     if n < 2 * BESIDE or not known.any():
@@ -254,8 +252,5 @@ def changes(t: FloatArray, y: FloatArray, w: FloatArray, start: int = 0) -> list
     if p >= CHANGED or (sloped / scale[:, at]).sum() > gain[at]:
         return []
     cut = at + 1
-    return [
-        *changes(t[:cut], y[:, :cut], w[:, :cut], start),
-        start + cut,
-        *changes(t[cut:], y[:, cut:], w[:, cut:], start + cut),
-    ]
+    later = changes(t[cut:], y[:, cut:], w[:, cut:])
+    return [*changes(t[:cut], y[:, :cut], w[:, :cut]), cut, *(cut + place for place in later)]

@@ -103,9 +103,8 @@ class History:
 
     def as_json(self) -> str:
         """What was found, as the text of a JSON file."""
-        parts = {}
-        for name, frame in (("robots", self.roster), ("findings", self.findings)):
-            parts[name] = json.loads(frame.fill_nan(None).write_json())
+        frames = {"robots": self.roster, "findings": self.findings}
+        parts = {name: json.loads(one.fill_nan(None).write_json()) for name, one in frames.items()}
         parts["untested"] = [one.text for one in self.untested]
         return json.dumps(parts, indent=2, allow_nan=False)
 

@@ -179,13 +179,18 @@ def _of_phases(found: Fitted) -> Iterator[Notice]:
 
 
 def _of_mass(found: Fitted) -> Iterator[Notice]:
-    """Notice of an arm heavier than steel cubes of its links: m1 lc1 / l1 + m2 = k4 / (g l1)."""
+    """Notice of an arm or a payload heavier than a steel cube of link 1's length.
+
+    The arm has m1 lc1 / l1 + m2 = k4 / (g l1).
+    """
     fit, by_constants = found.fit, length_by_constants(found.fit)
     if K4 not in fit.names or K4 in fit.absent or by_constants is None:
         return
     length, std = by_constants
     if LEAST_SURE * std < length:
-        mass = abs(float(fit.values[fit.names.index(K4)])) / (fit.shared.model.gravity * length)
+        values = dict(zip(fit.names, fit.values.tolist(), strict=True))
+        arm = abs(values[K4]) / (fit.shared.model.gravity * length)
+        mass = max(arm, values.get("m_p", 0.0))
         if mass > STEEL * length**3:
             numbers = {"case": "heavy", "mass": mass, "length": length}
             milli = Remedy({"torque_unit": "mN m"}, "where torques are in mN m")

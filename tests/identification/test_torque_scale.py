@@ -89,7 +89,13 @@ def test_an_arm_of_lead_asks_for_the_unit_of_its_torques() -> None:
     assert ": check the torque unit" in asked.clause
     (remedy,) = asked.remedies
     assert remedy.flags == ("--torque-unit", "mN m")
-    assert HEAVY not in {one.key for one in identify(log_of(), report=False).notices}
+    arm = identify(log_of(), report=False)
+    assert HEAVY not in {one.key for one in arm.notices}
+    loaded = currents(loaded=True)
+    for factor, seen in ((1, False), (1e3, True)):  # of a payload's log alone
+        log = replace(loaded, tau=factor * CONSTANT * loaded.tau, omega=None)
+        result = identify(None, log, parameters=arm, report=False)
+        assert (HEAVY in {one.key for one in result.notices}) is seen
 
 
 def test_the_gain_that_a_known_payload_shows_is_told_by_all_that_use_the_arm() -> None:
