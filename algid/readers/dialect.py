@@ -152,10 +152,11 @@ def detect(head: bytes, names: Sequence[str] | None = None) -> Dialect:
                 f"them: {', '.join(names)[:200]}; name each: {flag('columns')}"
             )
         # the header may be one of the comments above
-        texts = [list(names or ()), *(split(text, separator) for text in reversed(above))]
+        texts = (split(text, separator) for text in reversed(above))
         fitting = [one for one in texts if len(one) == len(columns)]
         numbered = [f"column {place}" for place in range(1, len(columns) + 1)]
-        columns = next((one for one in fitting if not any(map(_is_number, one))), numbered)
+        found_above = next((one for one in fitting if not any(map(_is_number, one))), numbered)
+        columns = list(names or found_above)
     units = _units(columns, split(rows[0], separator)) if rows else {}
     if units:
         skip, rows = skip + 1, rows[1:]

@@ -154,8 +154,8 @@ def open_offered(path: str, offered: Offered, profile: Profile) -> TableReader:
         clock = Clock("s", False)  # algid's own names mean algid's own units
     angles = [sources[name] for name in ("theta1", "theta2") if name in sources]
     others, places = dict[str, str](), {"t": sources["t"]}
-    for joint, source in [*other_joints(fields, angles).items()][: LIMITS.other_joints]:
-        if fields[source].is_number:
+    for joint, source in other_joints(fields, angles).items():
+        if fields[source].is_number and len(others) < LIMITS.other_joints:
             others[fields[source].joint or joint] = places[source] = source
     # of counts nobody knows how far they are
     angle = ANGLE.get(profile.channel("theta1").unit or units.get("theta1", "rad"))

@@ -158,6 +158,9 @@ def test_columns_of_a_table_without_a_header_are_named(tmp_path: Path) -> None:
     assert "no column for t, theta1, theta2, tau1, tau2; found 'column 1', 'co" in seen.refused
     assert """as --set 'columns=["t", "theta1", "theta2", "tau1", "tau2"]'""" in seen.refused
     assert np.array_equal(read_log(path, Profile(columns=NAMES)).theta, LOG.theta)
+    seen = algid.inspect(path, columns=["0", *NAMES[1:]])  # a name may be a number
+    assert [one.name for one in seen.entries] == [f"column {n}" for n in range(1, 6)]
+    assert "found '0', 'theta1'" in seen.refused
     path.write_text("\n".join(["# " + HEAD, *ROWS, ""]))  # the user's names beat the comment's
     with pytest.raises(LogError, match=r"5 columns, and 2 names for them: t, q1; name each"):
         read_log(path, Profile(columns=("t", "q1")))

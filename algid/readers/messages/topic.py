@@ -150,7 +150,7 @@ def topic_tables(
             told.append(Notice("MESSAGES_LEFT_OUT", numbers=absent))
             continue
         channel = file.channel(topic)
-        units, _ = stated_of(channel, paths)
+        units = stated_of(channel, paths)[0] if len(files) > 1 else {}
         if known not in (None, units):
             said = [", ".join(map(" in ".join, one.items())) or "none" for one in (units, known)]
             raise LogError(
