@@ -145,12 +145,12 @@ def open_source(
             f"{source.name}: its metadata say that the payload changes; weigh it with algid track"
         )
     if (truth.payload > 0) != (role == "loaded"):
-        payload = "no payload"
+        payload, kind = "no payload", "an unloaded"
         if truth.payload > 0:
-            payload = f"a payload of {truth.payload:g} kg"
+            payload, kind = f"a payload of {truth.payload:g} kg", "a loaded"
         raise LogError(
             f"{source.name}: expected a log of the {role} arm, its metadata say {payload}; "
-            "swap the logs"
+            f"give it as {kind} one"
         )
     return source
 

@@ -80,7 +80,14 @@ class Comparison:
             every.append(settings_of(one) | {"estimator": one.estimator, "algid": one.version})
         for name in dict.fromkeys(name for settings in every for name in settings):
             values = [settings.get(name, ABSENT) for settings in every]
-            if len(set(values)) > 1 and not ASIDE.fullmatch(name):
+            role, of_log, _ = name.partition(" log.")
+            # a result without logs of a role reads none otherwise
+            compared = {
+                value
+                for value, one in zip(values, self.results, strict=True)
+                if not of_log or any(log.role == role for log in one.logs)
+            }
+            if len(compared) > 1 and not ASIDE.fullmatch(name):
                 differ[name] = values
         return differ
 

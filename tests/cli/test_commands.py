@@ -56,10 +56,10 @@ def test_synth_identify_check(logs: Path, tmp_path: Path) -> None:
     assert bad.out.splitlines()[1].startswith("ok    k2")
 
 
-def test_swapped_logs_are_told(logs: Path, tmp_path: Path) -> None:
+def test_a_loaded_log_among_unloaded_ones_is_told(logs: Path, tmp_path: Path) -> None:
     found = Outcome("identify", logs / "case1-loaded.csv", "-o", tmp_path)
     assert found.code == 2
-    assert "swap the logs" in found.err
+    assert "give it as a loaded one" in found.err
 
 
 def test_a_failed_result_ends_with_three_and_says_what_to_run(logs: Path, tmp_path: Path) -> None:

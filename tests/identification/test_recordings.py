@@ -45,14 +45,17 @@ def moving(
             0.2,
             "unloaded",
             (
-                "expected a log of the unloaded arm, its metadata say a payload of 0.2 kg; swap "
-                "the logs"
+                "expected a log of the unloaded arm, its metadata say a payload of 0.2 kg; give "
+                "it as a loaded one"
             ),
         ),
         (
             0.0,
             "loaded",
-            "expected a log of the loaded arm, its metadata say no payload; swap the logs",
+            (
+                "expected a log of the loaded arm, its metadata say no payload; give it as an "
+                "unloaded one"
+            ),
         ),
     ],
 )

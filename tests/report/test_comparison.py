@@ -57,6 +57,24 @@ def test_only_what_was_set_or_read_otherwise_is_shown(result: Result) -> None:
     assert compare([result, result], ["a", "b"]).tables()[1].note.startswith("Every setting")
 
 
+def test_logs_that_a_result_does_not_have_are_not_read_otherwise(result: Result) -> None:
+    def beside(*units: str) -> Result:
+        loaded = [
+            result.log.model_copy(
+                update={
+                    "role": "loaded",
+                    "reading": Reading(channels={"tau1": ChannelReading("i", unit)}),
+                }
+            )
+            for unit in units
+        ]
+        return result.model_copy(update={"more_logs": loaded})
+
+    assert compare([beside("A"), beside()], ["a", "b"]).settings == {}
+    differ = compare([beside("A"), beside(), beside("mA")], ["a", "b", "c"]).settings
+    assert differ == {"loaded log.channels.tau1.unit": ["A", "–", "mA"]}
+
+
 def apart(result: Result, *sigmas: float) -> Comparison:
     """Results whose k1 and, by a hair less, k2 lie so many combined σ from the first one's."""
     several = [result]
