@@ -27,7 +27,6 @@ trusted.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -77,19 +76,15 @@ def columns(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) ->
     omega1, omega2 = omega
     c2, s2 = np.cos(theta[1]), np.sin(theta[1])
     moved = theta - theta[..., :1]
-    return IntegralColumns(
-        inertia1=_of_acceleration(moved[0], t, dt),
-        coupling1=_of_derivative(c2 * (2 * omega1 + omega2), t, dt),
-        inertia2=_of_acceleration(moved[1], t, dt),
-        viscous1=_of_derivative(moved[0], t, dt),
-        gravity1=_twice(t**2 * np.cos(theta[0]), dt),
-        gravity12=_twice(t**2 * np.cos(theta[0] + theta[1]), dt),
-        torque1=_twice(t**2 * tau[0], dt),
-        coupling2=_of_derivative(c2 * omega1, t, dt)
-        + _twice(t**2 * s2 * omega1 * (omega1 + omega2), dt),
-        viscous2=_of_derivative(moved[1], t, dt),
-        torque2=_twice(t**2 * tau[1], dt),
-    )
+    inertia1, inertia2 = _of_acceleration(moved, t, dt)
+    viscous1, viscous2 = _of_derivative(moved, t, dt)
+    gravity1, gravity12 = _twice(t**2 * np.cos(np.cumsum(theta, axis=0)), dt)
+    torque1, torque2 = _twice(t**2 * tau, dt)
+    coupling1 = _of_derivative(c2 * (2 * omega1 + omega2), t, dt)
+    centrifugal = _twice(t**2 * s2 * omega1 * (omega1 + omega2), dt)
+    coupling2 = _of_derivative(c2 * omega1, t, dt) + centrifugal
+    of_joint1 = (inertia1, coupling1, inertia2, viscous1, gravity1, gravity12, torque1)
+    return IntegralColumns(*of_joint1, coupling2, viscous2, torque2)
 
 
 def _twice(signal: FloatArray, dt: float) -> FloatArray:
@@ -214,8 +209,8 @@ def _single_unknown(coefficient: FloatArray, rhs: FloatArray) -> tuple[FloatArra
 
     a is a difference of integrals, and vanishes beside the largest it has been when singular.
     """
-    largest = np.maximum.accumulate(np.abs(coefficient), axis=-1)
     size = np.abs(coefficient)
+    largest = np.maximum.accumulate(size, axis=-1)
     condition = np.divide(largest, size, out=np.full_like(size, np.inf), where=size > 0)
     regular = condition <= LARGEST_CONDITION
     return np.divide(rhs, coefficient, out=np.full_like(rhs, np.nan), where=regular), condition
@@ -278,26 +273,15 @@ STAGE2_SERIES = (*STAGE2_NAMES, "l1", "m_p", "condition")
 Stage = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
 
 
-@dataclass(frozen=True, eq=False)
-class PaperSeries:
-    """Estimates (s, n) of one window, its times `t` (n,) in s, and settled samples at its end."""
+class PaperSeries(NamedTuple):
+    """Estimates (s, n) of one window at its times `t` (n,) in s, and their `settled` quartiles.
+
+    The quartiles (3, s) are those of the samples at its end.
+    """
 
     t: FloatArray
     values: FloatArray
-    settled: int
-
-    @property
-    def quartiles(self) -> FloatArray:
-        """Quartiles (3, s) of what is settled and no NaN (singular, before ε)."""
-        settled = self.values[:, -self.settled :]
-        quartiles = np.full((3, len(settled)), np.nan)
-        some = np.isfinite(settled).any(axis=1)
-        if some.any():
-            usable = settled[some]
-            # the former goes row by row
-            quantile = np.nanquantile if np.isnan(usable).any() else np.quantile
-            quartiles[:, some] = quantile(usable, [0.25, 0.5, 0.75], axis=1)
-        return quartiles
+    settled: FloatArray
 
 
 def series_of(source: Iterable[Segment], window: float, stage: Stage) -> Iterator[PaperSeries]:
@@ -313,23 +297,28 @@ def series_of(source: Iterable[Segment], window: float, stage: Stage) -> Iterato
     for piece in pieces(source, lambda dt: max(8, round(window / dt))):
         if len(piece) >= 8 and piece.omega is not None:  # what is shorter cannot be integrated
             values = stage(piece.theta, piece.omega, piece.tau, piece.dt)
-            yield PaperSeries(t=piece.t, values=values, settled=round(SETTLED / piece.dt))
+            settled = values[:, -round(SETTLED / piece.dt) :]
+            yield PaperSeries(piece.t, values, quartiles(settled))
 
 
-def estimates(quartiles: Sequence[FloatArray], size: int) -> tuple[FloatArray, FloatArray]:
-    """Estimates (s,) by windows' `quartiles`, and how far they wander (s,), NaN where none.
+def quartiles(values: FloatArray) -> FloatArray:
+    """Quartiles (3, s) of those of the values (s, n) that are no NaN (singular, before ε)."""
+    found = np.full((3, len(values)), np.nan)
+    some = np.isfinite(values).any(axis=1)
+    if some.any():
+        found[:, some] = np.nanquantile(values[some], [0.25, 0.5, 0.75], axis=1)
+    return found
+
+
+def estimates(settled: Sequence[FloatArray], size: int) -> tuple[FloatArray, FloatArray]:
+    """Estimates (s,) by windows' `settled` quartiles, and how far they wander (s,), NaN where none.
 
     They wander by half the distance of the quartiles, within windows or between them.
     """
-    low, middle, high = np.stack([np.full((3, size), np.nan), *quartiles], axis=-1)
-    estimate, wander = np.full((2, size), np.nan)
-    some = np.isfinite(middle).any(axis=1)
-    if some.any():
-        estimate[some] = np.nanmedian(middle[some], axis=1)
-        within = np.nanmedian(high[some] - low[some], axis=1)
-        between = np.subtract(*np.nanquantile(middle[some], [0.75, 0.25], axis=1))
-        wander[some] = 0.5 * np.maximum(within, between)
-    return estimate, wander
+    low, middle, high = np.stack([np.full((3, size), np.nan), *settled], axis=-1)
+    _, within, _ = quartiles(high - low)
+    first, estimate, third = quartiles(middle)
+    return estimate, 0.5 * np.maximum(within, third - first)
 
 
 def wanders(estimate: FloatArray, wander: FloatArray) -> NDArray[np.bool_]:

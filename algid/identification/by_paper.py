@@ -38,7 +38,6 @@ from algid.table4 import UNITS, UNLOADED_ROWS, finite, sums
 
 STAGE1_WINDOW = 2.0  # s
 _UNITS = PARAMETER_UNITS | UNITS
-NOTHING: FloatArray = np.zeros(0)
 STAGE1_FILE = "estimates.parquet"
 STAGE2_FILE = "loaded.parquet"
 ROWS = 1 << 17  # of a block of the series
@@ -88,12 +87,13 @@ def run_paper(
             rows = _named(UNLOADED_ROWS, np.array([*sums(UNLOADED_ROWS, k).values()]), usable)
     if survey.loaded:
         names = STAGE2_NAMES + ("l1", "m_p")
-        of_loaded = _named(names)
+        values = wander = np.zeros(len(names))
+        usable = values > 0  # none where stage 1 failed
         if k is not None and np.isfinite(k).all():
             values, wander, usable = _estimate(survey, survey.loaded[0], settings, k, folder)
-            of_loaded = _named(names, values, usable)
-            if np.any((values + FAR_BEYOND * wander)[len(STAGE2_NAMES) : len(names)] < 0):
-                wrong += ["loaded", "payload"]
+        of_loaded = _named(names, values, usable)
+        if np.any((values + FAR_BEYOND * wander)[len(STAGE2_NAMES) : len(names)] < 0):
+            wrong += ["loaded", "payload"]
     changes = {
         "parameters": parameters,
         "loaded": {name: of_loaded[name] for name in within(STAGE2_NAMES, of_loaded)},
@@ -121,9 +121,7 @@ def _estimate(
     """
     # else beside another estimator, whose settings are not its own
     asked = settles(settings.estimator)
-    window = STAGE1_WINDOW
-    if asked and settings.window is not None:
-        window = settings.window
+    window = (settings.window if asked else None) or STAGE1_WINDOW
     moving = with_velocities(survey, log, settings)
     names: Sequence[str]
     if k is None:
@@ -132,13 +130,13 @@ def _estimate(
     else:
         names, file = STAGE2_SERIES, STAGE2_FILE
         series = series_of(moving, window, partial(stage2, k=k, gravity=settings.gravity))
-    quartiles = list[FloatArray]()
+    settled = list[FloatArray]()
 
     def columns() -> Iterator[dict[str, FloatArray]]:
         """Blocks of whole windows, each of some `ROWS` samples."""
         gathered, rows = list[PaperSeries](), 0
         for one in series:
-            quartiles.append(one.quartiles)
+            settled.append(one.settled)
             gathered.append(one)
             rows += one.t.size
             if rows >= ROWS:
@@ -158,7 +156,7 @@ def _estimate(
             f"{log.name}: {duration:.3g} s long; the paper's method needs {SHORTEST:g} s at least "
             "to settle; record longer"
         )
-    estimate, wander = estimates(quartiles, len(names))
+    estimate, wander = estimates(settled, len(names))
     return estimate, wander, ~wanders(estimate, wander)
 
 
@@ -182,12 +180,11 @@ def _is_no_arm(k: FloatArray, wander: FloatArray) -> bool:
 
 
 def _named(
-    names: Collection[str], values: FloatArray = NOTHING, usable: NDArray[np.bool_] = NOTHING > 0
+    names: Collection[str], values: FloatArray, usable: NDArray[np.bool_]
 ) -> dict[str, Estimate]:
-    """Estimates by name; those that are not usable have none, as all have where stage 1 failed."""
+    """Estimates by name; those that are not usable have none."""
     named = {}
-    for place, name in enumerate(names):
-        weak = Estimate(estimate=None, unit=_UNITS[name], status=Status.WEAK_EXCITATION)
-        good = usable[place : place + 1].any()
-        named[name] = Estimate(estimate=finite(values[place]), unit=_UNITS[name]) if good else weak
+    for name, value, good in zip(names, values.tolist(), usable.tolist(), strict=False):
+        known = (finite(value), Status.OK) if good else (None, Status.WEAK_EXCITATION)
+        named[name] = Estimate(estimate=known[0], unit=_UNITS[name], status=known[1])
     return named

@@ -11,9 +11,9 @@ import sympy as sp
 from algid.arm import FloatArray, inverse_dynamics
 from algid.estimators import paper
 from algid.estimators.paper import (
-    PaperSeries,
     columns,
     estimates,
+    quartiles,
     wanders,
 )
 from algid.synth.cases import load_case
@@ -80,21 +80,15 @@ def test_joint_2_at_rest_leaves_k7_open_and_its_condition_infinite() -> None:
     assert np.isnan(found[6]).all()
 
 
-def _quartiles(*rows: list[float]) -> FloatArray:
-    values = np.array(rows)
-    return PaperSeries(np.arange(values.shape[1]) * 0.1, values, settled=4).quartiles
-
-
 def test_an_estimate_is_the_median_of_medians_and_wanders_by_half_its_quartiles() -> None:
     assert np.isnan(estimates([], 3)).all()
     nan = np.nan
-    # what is not settled counts nothing
-    windows = [_quartiles([99, 1, 2, 3, 4], [9, nan, 5, 5, 5], [nan] * 5)]
+    windows = [quartiles(np.array([[1, 2, 3, 4], [nan, 5, 5, 5], [nan] * 4]))]
     estimate, wander = estimates(windows, 3)
     np.testing.assert_allclose(estimate, [2.5, 5, nan])
     np.testing.assert_allclose(wander, [0.5 * (3.25 - 1.75), 0, nan])
-    windows.append(_quartiles([0, 7, 7, 7, 7], [0, nan, nan, nan, nan], [nan] * 5))
-    windows.append(_quartiles([0, 3, 3, 3, 3], [0, 1, 1, 1, 1], [nan] * 5))
+    windows.append(quartiles(np.array([[7.0] * 4, [nan] * 4, [nan] * 4])))
+    windows.append(quartiles(np.array([[3.0] * 4, [1.0] * 4, [nan] * 4])))
     estimate, wander = estimates(windows, 3)
     np.testing.assert_allclose(estimate, [3, 3, nan])  # medians 2.5, 7, 3 and 5, 1
     # between windows more than within

@@ -39,8 +39,11 @@ def test_noise_alone_wanders() -> None:
         draw.normal(0, 1e-2, shape),
         draw.normal(0, 0.1, shape),
     )
-    quartiles = [series.quartiles for series in series_of([still], 2.0, stage1)]
-    assert wanders(*estimates(quartiles, len(STAGE1_SERIES)))[:7].any()
+    windows = list(series_of([still], 2.0, stage1))
+    assert wanders(*estimates([one.settled for one in windows], len(STAGE1_SERIES)))[:7].any()
+    # what is not settled counts nothing: the last 0.2 s alone
+    late = windows[0].values[:, -200:]
+    np.testing.assert_allclose(windows[0].settled[1], np.nanmedian(late, axis=1))
 
 
 def test_systems_of_any_scale_are_solved_alike() -> None:
