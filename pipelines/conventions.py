@@ -127,7 +127,8 @@ def mended(log: Log, k: FloatArray) -> bool:
     judged = conventions_of(log)
     if judged is None or not judged.alone or judged.best.convention == AS_READ:
         return False
-    return bool(np.allclose(judged.best.k[:5], k[:5], rtol=ALIKE, atol=ALIKE * k[:5].max()))
+    found = list(judged.best.constants.values())
+    return bool(np.allclose(found[:5], k[:5], rtol=ALIKE, atol=ALIKE * k[:5].max()))
 
 
 def furthest(result: Result, k: FloatArray) -> float:

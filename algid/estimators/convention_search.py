@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
-from math import atan2, copysign, pi, remainder
+from math import copysign, pi, remainder
 from operator import itemgetter
 
 import numpy as np
@@ -48,8 +48,8 @@ from algid.model import (
     MOMENTS,
     SINE_OF,
     SINES,
+    phasor_of,
 )
-from algid.signals.segments import Segment
 
 # Hz and s: what is looked at, and what scales are sought in
 _FINE, _COARSE = (
@@ -103,32 +103,28 @@ class Candidate:
     ----------
     family : Convention, without its zeros
     zero : those, in rad
-    names : of the constants that the log may determine
-    k : (q,), what is found for them
-    covariance : (q, q), of `k`
+    constants : by name, what is found for those that the log may determine
+    covariance : (q, q), of these
     left : (2,), share of each recorded torque's mean square that is not explained
-    score : sum of the logarithms of what is left: less is better
     speed : (2,), RMS of the joints' in rad/s
     """
 
     family: Convention
     zero: tuple[float, float]
-    names: tuple[str, ...]
-    k: FloatArray
+    constants: dict[str, float]
     covariance: FloatArray
     left: FloatArray
-    score: float
     speed: FloatArray
+
+    @cached_property
+    def score(self) -> float:
+        """Sum of the logarithms of what is left: less is better."""
+        return float(_score(self.left, LEAST))
 
     @property
     def convention(self) -> Convention:
         """The convention, zeros included."""
         return replace(self.family, zero=self.zero)
-
-    @property
-    def constants(self) -> dict[str, float]:
-        """What is found, by name."""
-        return dict(zip(self.names, self.k.tolist(), strict=True))
 
     @property
     def other_side(self) -> Convention:
@@ -251,7 +247,8 @@ def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgeme
 
 
 def _judged(candidates: Sequence[Candidate], trials: Trials) -> Judgement:
-    as_read = next(one for one in candidates if one.convention == AS_READ)
+    """The judgement on candidates of which the first is the log as it was read."""
+    as_read = candidates[0]
     lawful = sorted((one for one in candidates if not one.broken), key=lambda one: one.score)
     if not lawful:
         return Judgement(as_read, as_read, False, trials)
@@ -302,26 +299,24 @@ class Trials:
             ]
             for rate, longest in (_FINE, _COARSE)
         )
-        self._read = logs[0]
         self._model = MODEL if gravity else replace(MODEL, gravity=0.0)
         self._names = outside(self._model.names, SINES)
-        self._free = np.eye(len(self._model.names))[None]
         self._turns = _TURNS if gravity else _TURNS[:2]
         self._passes: dict[tuple[Convention, bool], ConventionSums] = {}
-        self.seconds = self._sums(AS_READ, self._fine).seconds
+        self.seconds = self._sums(AS_READ).seconds
         """How long the logs move, in s."""
         self.apart = max(APART, 2 * EVIDENCE * WINDOW / max(self.seconds, _SHORTEST))
         """By how much the scores of two distinct conventions differ."""
 
     def under(self, family: Convention, *zeros: tuple[float, float]) -> list[Candidate]:
         """The candidates of a family with each of some zeros."""
-        sums = self._sums(family, self._fine)
-        c, left, covariance = solved(sums, [family], np.stack(list(map(self._place, zeros))))
-        every = zip(zeros, c, covariance, left, _score(left, LEAST).tolist(), strict=True)
-        return [
-            Candidate(family, zero, self._names, k, V, share, score, sums.speed)
-            for zero, k, V, share, score in every
-        ]
+        sums = self._sums(family)
+        c, left, covariance = solved(sums, [family], self._places(np.array(zeros)))
+        found = []
+        for zero, k, V, share in zip(zeros, c.tolist(), covariance, left, strict=True):
+            constants = dict(zip(self._names, k, strict=True))
+            found.append(Candidate(family, zero, constants, V, share, sums.speed))
+        return found
 
     def reweighed(self) -> Candidate:
         """The logs as they were read, without gravity where it was said to act, or with it."""
@@ -338,8 +333,8 @@ class Trials:
         gone over from the least of that on, until no lawful convention of the rest can come near.
         """
         bounds: list[tuple[float, Convention]] = []
-        for families in _families(self._read):
-            left = self._with_phases(families, self._fine)[1]
+        for families in _families(self._logs[0]):
+            _, left = self._with_phases(families)
             bounds += zip(_score(left, LEAST).tolist(), families, strict=True)
         found = self.under(AS_READ, AS_READ.zero)
         for place, (bound, family) in enumerate(sorted(bounds, key=itemgetter(0))):
@@ -368,40 +363,39 @@ class Trials:
         return turned
 
     def _with_phases(
-        self, families: Sequence[Convention], logs: Sequence[Segment]
+        self, families: Sequence[Convention], *, coarse: bool = False
     ) -> tuple[FloatArray, FloatArray]:
         """Coefficients (F, q) of families of the same angles, a free phase for each moment.
 
         With them the shares (F, 2) that are left.
         """
-        c, left, _ = solved(self._sums(families[0], logs), families, self._free)
+        every = np.eye(len(self._model.names))[None]
+        c, left, _ = solved(self._sums(families[0], coarse=coarse), families, every)
         return c, left
 
-    def _phase(self, c: FloatArray, moment: str) -> float:
-        """The phase in rad of a moment among the coefficients (q,), 0 of one without a column."""
+    def _phases(self, c: FloatArray) -> FloatArray:
+        """The phases in rad of the moments among coefficients (q,), 0 of one without a column."""
         k = dict(zip(self._model.names, c.tolist(), strict=True))
-        return atan2(k.get(SINE_OF[moment], 0.0), k.get(moment, 0.0))
+        return np.angle([phasor_of(k, moment) for moment in MOMENTS])
 
     def bent(self) -> float | None:
         """What is left as the log was read with a phase for each moment.
 
         None where one is no phase.
         """
-        (c,), left = self._with_phases([AS_READ], self._fine)
-        if any(abs(self._phase(c, moment)) > LARGEST_PHASE for moment in MOMENTS):
-            return None
-        return float(_score(left)[0])
+        (c,), left = self._with_phases([AS_READ])
+        return None if np.abs(self._phases(c)).max() > LARGEST_PHASE else float(_score(left)[0])
 
     def _best_zero(self, family: Convention) -> tuple[float, float]:
         """Zeros δ1 and δ2 in rad of least residual; k1, k2 and k4 are positive if determined."""
-        sums, ((c,), _) = self._sums(family, self._fine), self._with_phases([family], self._fine)
-        start = np.array([self._phase(c, K4), self._phase(c, K1)])
+        sums, ((c,), _) = self._sums(family), self._with_phases([family])
+        of_k1, _, of_k4 = self._phases(c)
 
         def scores(zeros: FloatArray) -> FloatArray:
-            return _score(solved(sums, [family], np.stack(list(map(self._place, zeros))))[1])
+            return _score(solved(sums, [family], self._places(zeros))[1])
 
-        best = _least(scores, start)
-        return remainder(float(best[0]), 2 * pi), remainder(float(best[1]), 2 * pi)
+        first, second = _least(scores, np.array([of_k4, of_k1])).tolist()
+        return remainder(first, 2 * pi), remainder(second, 2 * pi)
 
     def _scaled(self, joints: tuple[int, int]) -> Convention | None:
         """What the angles of `joints` have to be divided by.
@@ -409,20 +403,21 @@ class Trials:
         None where no scale leaves far less than none.
         """
 
-        def score(scale: float, logs: Sequence[Segment] = self._fine) -> float:
-            return float(_score(self._with_phases([_scaled_by(scale, joints)], logs)[1])[0])
+        def score(scale: float, *, coarse: bool = False) -> float:
+            _, left = self._with_phases([_scaled_by(scale, joints)], coarse=coarse)
+            return float(_score(left)[0])
 
         def scores(points: FloatArray) -> FloatArray:
             return np.array(list(map(score, np.exp(points[:, 0]).tolist())))
 
         travel = np.max([np.ptp(log.theta, axis=1) for log in self._coarse], axis=0)
-        grid = _grid(travel[np.array(joints) == 1])
-        scale = min(grid, key=lambda scale: score(scale, self._coarse))
-        if score(scale, self._coarse) > score(1.0, self._coarse) - self.apart:
+        grid = _grid(float((travel * joints).max()))
+        scale = min(grid, key=partial(score, coarse=True))
+        if score(scale, coarse=True) > score(1.0, coarse=True) - self.apart:
             return None
         scale = float(np.exp(_least(scores, np.log([scale]))[0]))
         # a unit before a gear: what rubs leaves the scale open by a few per cent
-        likely = [one for one in self._read.unit_scales if 0.5 < one / scale < 2]
+        likely = [one for one in self._logs[0].unit_scales if 0.5 < one / scale < 2]
         nearest = min(_EXACT, key=lambda whole: abs(scale / whole - 1))
         if abs(scale / nearest - 1) < _NEAR:
             likely.append(nearest)
@@ -430,26 +425,25 @@ class Trials:
         scale = next((one for one in likely if score(one) < least), scale)
         return _scaled_by(scale, joints)
 
-    def _place(self, zero: Sequence[float]) -> FloatArray:
-        """T (q, p) of the zeros δ1 and δ2."""
-        T = np.zeros((len(self._model.names), len(self._names)))
-        turned = {K1: zero[1], K2: zero[0] + zero[1], K4: zero[0]}
+    def _places(self, zeros: FloatArray) -> FloatArray:
+        """T (Z, q, p) of Z zeros δ1 and δ2 (Z, 2)."""
+        places = self._model.compiled.place
+        T = np.zeros((len(zeros), len(places), len(self._names)))
+        turned = {K1: zeros[:, 1], K2: zeros.sum(axis=1), K4: zeros[:, 0]}
         for column, name in enumerate(self._names):
-            angle = turned.get(name, 0.0)
-            T[self._model.names.index(name), column] = np.cos(angle)
+            angle = turned.get(name, np.zeros(1))
+            T[:, places[name], column] = np.cos(angle)
             if name in turned:
-                T[self._model.names.index(SINE_OF[name]), column] = np.sin(angle)
+                T[:, places[SINE_OF[name]], column] = np.sin(angle)
         return T
 
-    def _sums(self, family: Convention, logs: Sequence[Segment]) -> ConventionSums:
+    def _sums(self, family: Convention, *, coarse: bool = False) -> ConventionSums:
         """Sums for a family's angles, one pass for all that share them."""
-        angles = Convention(
-            swapped=family.swapped, scale=family.scale, signs=family.signs, absolute=family.absolute
-        )
-        key = angles, logs is self._fine
-        if key not in self._passes:
-            self._passes[key] = summed(angles, logs, self._model)
-        return self._passes[key]
+        angles = replace(family, torques_swapped=False, torque_signs=(1, 1), base=0)
+        if (angles, coarse) not in self._passes:
+            logs = self._coarse if coarse else self._fine
+            self._passes[angles, coarse] = summed(angles, logs, self._model)
+        return self._passes[angles, coarse]
 
 
 def _families(read: Recorded) -> Iterator[list[Convention]]:
@@ -472,36 +466,38 @@ def _scaled_by(scale: float, joints: tuple[int, int]) -> Convention:
     return Convention(scale=(scale ** joints[0], scale ** joints[1]))
 
 
-def _grid(travel: FloatArray) -> list[float]:
+def _grid(travel: float) -> list[float]:
     """Scales to try for angles of this `travel` (rad as read), at most half a radian apart."""
-    scale = max(_SCALES[0], float(travel.max()) / _WIDEST)
+    scale = max(_SCALES[0], travel / _WIDEST)
     grid = []
     while scale < _SCALES[1]:
         grid.append(scale)
-        scale *= 1 + min(0.15, 0.5 * scale / max(float(travel.max()), 1e-9))
+        scale *= 1 + min(0.15, 0.5 * scale / max(travel, 1e-9))
     return grid
 
 
 def _demands(k: dict[str, float], covariance: FloatArray, speed: FloatArray) -> dict[str, float]:
     """What physics demands of the coefficients, in standard deviations on its right side."""
-
-    def distance(value: float, slopes: dict[str, float]) -> float:
-        slope = vector(k, slopes, otherwise=0.0)
-        return value / max(float(slope @ covariance @ slope), 1e-300) ** 0.5
-
     k1, m22, k5 = k[K1], k[K3] + k[J2], k[K5]
-    distances = {
-        "M22 > 0": distance(m22, {K3: 1, J2: 1}),
-        "k5 > 0": distance(k5, {K5: 1}),
-        "det M > 0": distance(
-            k5 * m22 + k[K3] * k[J2] - k1**2,
-            {K1: -2 * k1, K3: k5 + k[J2], K5: m22, J2: k5 + k[K3]},
-        ),
-        "friction of joint 1 > 0": distance(k[K6] * speed[0] + k[F1], {K6: float(speed[0]), F1: 1}),
-        "friction of joint 2 > 0": distance(k[K7] * speed[1] + k[F2], {K7: float(speed[1]), F2: 1}),
+    first, second = speed.tolist()
+    slopes = {
+        "M22 > 0": {K3: 1.0, J2: 1.0},
+        "k5 > 0": {K5: 1.0},
+        "det M > 0": {K1: -2 * k1, K3: k5 + k[J2], K5: m22, J2: k5 + k[K3]},
+        "friction of joint 1 > 0": {K6: first, F1: 1.0},
+        "friction of joint 2 > 0": {K7: second, F2: 1.0},
+        "k1 > 0": {K1: 1.0},
+        "k2 > 0": {K2: 1.0},
+        "k4 > 0": {K4: 1.0},
     }
-    if K2 not in k:
-        return distances | {"k1 > 0": distance(k1, {K1: 1})}
-    first, second = distance(k1, {K1: 1}), distance(k[K2], {K2: 1})
-    both = copysign(min(abs(first), abs(second)), first * second)
-    return distances | {"k1 k2 > 0": both, "k2 > 0": second, "k4 > 0": distance(k[K4], {K4: 1})}
+    demands = {}
+    for name, of_demand in slopes.items():
+        if of_demand.keys() <= k.keys():
+            slope = vector(k, of_demand, otherwise=0.0)
+            spread = max(float(slope @ covariance @ slope), 1e-300) ** 0.5
+            demands[name] = float(slope @ vector(k, k)) / spread
+    demands["det M > 0"] /= 2  # of second degree, so that its slopes make twice its value
+    if "k2 > 0" in demands:
+        of_k1, of_k2 = demands.pop("k1 > 0"), demands["k2 > 0"]
+        demands["k1 k2 > 0"] = copysign(min(abs(of_k1), abs(of_k2)), of_k1 * of_k2)
+    return demands

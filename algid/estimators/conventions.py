@@ -89,14 +89,10 @@ class Convention:
 
     @property
     def drive(self) -> FloatArray:
-        """B, with which `torques` at the joints are made of those that were read."""
+        """B, by which torques at the joints are those that were read."""
         B = np.diag(self.torque_signs).astype(np.float64)
         B[0] += self.base * B[1]
         return B[:, ::-1] if self.torques_swapped else B
-
-    def torques(self, tau: FloatArray) -> FloatArray:
-        """Torques (2, N) at the joints in N m out of those that were read."""
-        return self.drive @ tau
 
     def mirrored(self) -> Convention:
         """The same arm seen from behind: another convention with the same constants."""
@@ -130,10 +126,8 @@ def thinned(theta: FloatArray, tau: FloatArray, dt: float, rate: float, longest:
     """Means over as many samples as leave `rate` Hz, of the first `longest` s."""
     width = max(1, round(1 / (rate * dt)))
     count = min(theta.shape[1], round(longest / dt)) // width
-    means = [
-        signal[:, : count * width].reshape(2, count, width).mean(axis=2) for signal in (theta, tau)
-    ]
-    return Segment(0.0, width * dt, *means)
+    signals = np.stack([theta, tau])[:, :, : count * width]
+    return Segment(0.0, width * dt, *signals.reshape(2, 2, count, width).mean(axis=3))
 
 
 def summed(angles: Convention, logs: Sequence[Segment], model: Model) -> ConventionSums:

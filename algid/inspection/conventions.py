@@ -94,7 +94,7 @@ def mend(origin: Origin, judgement: Judgement | None) -> Notice | None:
     # a small zero is a phase
     if judgement.alone and (best.family != AS_READ or max(map(abs, best.zero)) >= _SMALL):
         settings = _settings(best.convention, origin)
-    if not settings and K4 not in judgement.as_read.names:  # said to be without weight
+    if not settings and K4 not in judgement.as_read.constants:  # said to be without weight
         weighed = judgement.trials.reweighed()
         better = weighed.score < best.score - judgement.trials.apart
         if better and weighed.convincing and _has_weight(weighed):
@@ -130,7 +130,7 @@ def doubted(origin: Origin, judgement: Judgement | None) -> Notice | None:
     None where the log is right, shows a real arm no better with other signs or another zero, or the
     arm has no weight.
     """
-    if judgement is None or K4 not in judgement.as_read.names:
+    if judgement is None or K4 not in judgement.as_read.constants:
         return None
     as_read, trials = judgement.as_read, judgement.trials
     if judgement.alone and judgement.best.convention == AS_READ:

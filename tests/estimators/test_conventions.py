@@ -58,7 +58,7 @@ def test_an_arm_without_weight_tells_its_signs(bench: Bench, signs: tuple[int, i
     k = bench.arm.constants() * np.array([1, 0, 1, 0, 1, 1, 1])
     theta, tau = measured(simulate(k, wide_multi_sine(bench.arm, 3), np.arange(4001) * DT))
     mistake = Convention(torque_signs=signs)
-    found = judge_together([Recorded(theta, mistake.torques(tau), DT)], gravity=False)
+    found = judge_together([Recorded(theta, mistake.drive @ tau, DT)], gravity=False)
     assert found.alone
     assert found.best.convention == mistake
 
@@ -111,7 +111,7 @@ def test_a_balanced_second_link_has_either_sign(off: float) -> None:
     motion = simulate(arm.constants(), wide_multi_sine(arm, 3), np.arange(4001) * DT)
     for mistake in (AS_READ, Convention(torque_signs=(-1, -1)), Convention(signs=(1, -1))):
         theta, tau = measured(motion)
-        found = judged(mistake.angles(theta), mistake.torques(tau))
+        found = judged(mistake.angles(theta), mistake.drive @ tau)
         assert found.best.balanced
         assert found.alone
         assert found.best.convention == mistake
@@ -145,7 +145,9 @@ def test_an_arm_with_one_motor_tells_its_convention(
     found = judge_together([Recorded(*read, DT, passive)])
     assert found.alone
     assert (found.best.convention == AS_READ) == (mistake == "nothing")
-    np.testing.assert_allclose(found.best.k[:5], k[:5], rtol=0.02, atol=0.02 * k[:5].max())
+    np.testing.assert_allclose(
+        list(found.best.constants.values())[:5], k[:5], rtol=0.02, atol=0.02 * k[:5].max()
+    )
 
 
 @pytest.mark.parametrize("row", ["nothing", "τ1", "θ2 absolute", "zero hanging", "noise"])

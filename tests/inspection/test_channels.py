@@ -203,7 +203,7 @@ def test_what_a_check_tells_is_what_was_put_in(row: int) -> None:
 
 
 def test_angles_of_many_turns_are_read_where_physics_holds() -> None:
-    right = SimpleNamespace(convention=AS_READ, convincing=True, names=(), score=0.0)
+    right = SimpleNamespace(convention=AS_READ, convincing=True, constants={}, score=0.0)
     trials = SimpleNamespace(reweighed=lambda: right, apart=1.0)
     judged: Any = SimpleNamespace(as_read=right, best=right, alone=False, trials=trials)
     assert not of_codes(examine(logged(WIDE), lambda: judged), *SCALES)

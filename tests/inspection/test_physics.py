@@ -119,7 +119,9 @@ def judgement(
     """What a log may say: that `convention` is the right one, and what the one that it was read by
     breaks.
     """
-    as_read = SimpleNamespace(broken=broken or {}, left=np.array([0.123, 0.456]), names=("k4",))
+    as_read = SimpleNamespace(
+        broken=broken or {}, left=np.array([0.123, 0.456]), constants={"k4": 1.0}
+    )
     return SimpleNamespace(
         as_read=as_read,
         best=SimpleNamespace(
