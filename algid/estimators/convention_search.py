@@ -237,7 +237,9 @@ def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgeme
     candidates = trials.unscaled()
     judged = _judged(candidates, trials)
     if not judged.alone:
-        judged = _judged(candidates + list(trials.scaled()), trials)
+        for joints in ((1, 1), (1, 0), (0, 1)):
+            candidates += trials.scaled(joints)
+        judged = _judged(candidates, trials)
     best = judged.best
     if judged.alone and (best.family != AS_READ or max(map(abs, best.zero)) > LARGEST_PHASE):
         bent = trials.bent()
@@ -323,8 +325,18 @@ class Trials:
         return Trials(self._logs, gravity=K4 not in self._names).under(AS_READ, AS_READ.zero)[0]
 
     def zeroed(self, family: Convention) -> Candidate:
-        """The candidate of a family with the zeros that fit best."""
-        return self.under(family, self._best_zero(family))[0]
+        """The candidate of a family with the zeros δ1 and δ2 that fit best.
+
+        With them k1, k2 and k4 are positive if determined.
+        """
+        sums, ((c,), _) = self._sums(family), self._with_phases([family])
+        of_k1, _, of_k4 = self._phases(c)
+
+        def scores(zeros: FloatArray) -> FloatArray:
+            return _score(solved(sums, [family], self._places(zeros))[1])
+
+        first, second = _least(scores, np.array([of_k4, of_k1])).tolist()
+        return self.under(family, (remainder(first, 2 * pi), remainder(second, 2 * pi)))[0]
 
     def unscaled(self) -> list[Candidate]:
         """The log as read, and every convention without a scale that may come near the best.
@@ -344,12 +356,32 @@ class Trials:
             found += self._of_family(family, bound if place < _SHIFTED else np.inf)
         return found
 
-    def scaled(self) -> Iterator[Candidate]:
-        """Scales of both angles, or of one, of least residual at the log's own signs and order."""
-        for joints in ((1, 1), (1, 0), (0, 1)):
-            family = self._scaled(joints)
-            if family is not None:
-                yield from self._of_family(family)
+    def scaled(self, joints: tuple[int, int]) -> list[Candidate]:
+        """The scale of the angles of `joints`, each 1 or 0, of least residual, as else read.
+
+        None where no scale leaves far less than none.
+        """
+
+        def score(scale: float, *, coarse: bool = False) -> float:
+            _, left = self._with_phases([_scaled_by(scale, joints)], coarse=coarse)
+            return float(_score(left)[0])
+
+        def scores(points: FloatArray) -> FloatArray:
+            return np.array(list(map(score, np.exp(points[:, 0]).tolist())))
+
+        travel = np.max([np.ptp(log.theta, axis=1) for log in self._coarse], axis=0)
+        scale = min(_grid(float((travel * joints).max())), key=partial(score, coarse=True))
+        if score(scale, coarse=True) > score(1.0, coarse=True) - self.apart:
+            return []
+        scale = float(np.exp(_least(scores, np.log([scale]))[0]))
+        # a unit before a gear: what rubs leaves the scale open by a few per cent
+        likely = [one for one in self._logs[0].unit_scales if 0.5 < one / scale < 2]
+        nearest = min(_EXACT, key=lambda whole: abs(scale / whole - 1))
+        if abs(scale / nearest - 1) < _NEAR:
+            likely.append(nearest)
+        least = score(scale) + self.apart
+        scale = next((one for one in likely if score(one) < least), scale)
+        return self._of_family(_scaled_by(scale, joints))
 
     def _of_family(self, family: Convention, bound: float = -np.inf) -> list[Candidate]:
         """A family with zeros by quarter and half turns, and those that fit best if by far.
@@ -385,45 +417,6 @@ class Trials:
         """
         (c,), left = self._with_phases([AS_READ])
         return None if np.abs(self._phases(c)).max() > LARGEST_PHASE else float(_score(left)[0])
-
-    def _best_zero(self, family: Convention) -> tuple[float, float]:
-        """Zeros δ1 and δ2 in rad of least residual; k1, k2 and k4 are positive if determined."""
-        sums, ((c,), _) = self._sums(family), self._with_phases([family])
-        of_k1, _, of_k4 = self._phases(c)
-
-        def scores(zeros: FloatArray) -> FloatArray:
-            return _score(solved(sums, [family], self._places(zeros))[1])
-
-        first, second = _least(scores, np.array([of_k4, of_k1])).tolist()
-        return remainder(first, 2 * pi), remainder(second, 2 * pi)
-
-    def _scaled(self, joints: tuple[int, int]) -> Convention | None:
-        """What the angles of `joints` have to be divided by.
-
-        None where no scale leaves far less than none.
-        """
-
-        def score(scale: float, *, coarse: bool = False) -> float:
-            _, left = self._with_phases([_scaled_by(scale, joints)], coarse=coarse)
-            return float(_score(left)[0])
-
-        def scores(points: FloatArray) -> FloatArray:
-            return np.array(list(map(score, np.exp(points[:, 0]).tolist())))
-
-        travel = np.max([np.ptp(log.theta, axis=1) for log in self._coarse], axis=0)
-        grid = _grid(float((travel * joints).max()))
-        scale = min(grid, key=partial(score, coarse=True))
-        if score(scale, coarse=True) > score(1.0, coarse=True) - self.apart:
-            return None
-        scale = float(np.exp(_least(scores, np.log([scale]))[0]))
-        # a unit before a gear: what rubs leaves the scale open by a few per cent
-        likely = [one for one in self._logs[0].unit_scales if 0.5 < one / scale < 2]
-        nearest = min(_EXACT, key=lambda whole: abs(scale / whole - 1))
-        if abs(scale / nearest - 1) < _NEAR:
-            likely.append(nearest)
-        least = score(scale) + self.apart
-        scale = next((one for one in likely if score(one) < least), scale)
-        return _scaled_by(scale, joints)
 
     def _places(self, zeros: FloatArray) -> FloatArray:
         """T (Z, q, p) of Z zeros δ1 and δ2 (Z, 2)."""
