@@ -139,5 +139,4 @@ def _worths(fit: Fit) -> list[float]:
     m_p, _, r, J = fit.shared.physical(fit.values)
     if J < 0 or m_p * abs(r) ** 2 < J:
         return [0.0]
-    std = dict(zip(fit.names, fit.std.tolist(), strict=True))
-    return [fit.wald((name,)) if np.isfinite(std[name]) else 0.0 for name in fit.shared.body]
+    return [fit.wald((name,)) if name in fit.determined else 0.0 for name in fit.shared.body]

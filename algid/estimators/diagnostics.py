@@ -20,7 +20,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.base.compiled import chi2_exceeded, chi2_tail, normal_exceeded
-from algid.base.names import within
+from algid.base.names import outside, within
 from algid.base.significance import sigmas
 from algid.estimators.combine import (
     RANK_TOLERANCE,
@@ -104,13 +104,8 @@ def broken_bounds(fit: Fit) -> list[BrokenBound]:
     A parameter that the logs leave open breaks none, nor does a term that is shrunk: it takes up
     what the model lacks.
     """
-    unknown = list(fit.absent)
-    for name, deviation in zip(fit.names, fit.std, strict=True):
-        if np.isinf(deviation):
-            unknown.append(name)
-    if fit.shrinkage is not None:
-        unknown += fit.shrinkage.names
-    open_ones = {f"{name} >= 0" for name in unknown}
+    known = fit.determined.difference(() if fit.shrinkage is None else fit.shrinkage.names)
+    open_ones = {f"{name} >= 0" for name in outside(fit.names, known)}
     if {K1, K2} & set(fit.absent):
         open_ones.add("k1 k2 >= 0")
     if {K1, K3, K5} & set(fit.absent):
@@ -136,8 +131,7 @@ def length_by_constants(fit: Fit) -> tuple[float, float] | None:
     No gain of both torques changes it: where it is not the length that is known, gravity is
     compensated in part, or the zeros or the terms of the torque are wrong.
     """
-    known = np.array(fit.names)[np.isfinite(fit.std)].tolist()
-    if not {K1, K2} <= set(known) - set(fit.absent):
+    if not {K1, K2} <= fit.determined:
         return None
 
     def length(beta: FloatArray) -> float:
@@ -340,14 +334,13 @@ def payload_distance(fit: Fit) -> float | None:
     best. Where they agree it is χ² with as many degrees of freedom as constants less those of the
     payload.
     """
-    unloaded, loaded = of_kind(fit.logs, False), of_kind(fit.logs, True)
-    if not (fit.shared.payload and unloaded and loaded):
+    kinds = [of_kind(fit.logs, loaded) for loaded in (False, True)]
+    if not (fit.shared.payload and all(kinds)):
         return None
-    bare, burdened = alone(fit.shared, unloaded), alone(fit.shared, loaded)
+    bare, burdened = (alone(fit.shared, own) for own in kinds)
     constants = len(fit.shared.log_names)
-    if bare.unidentifiable or burdened.unidentifiable:
-        return None
-    if min(sum(len(log.S) for log in own) for own in (unloaded, loaded)) <= constants:
+    fewest = min(sum(len(log.S) for log in own) for own in kinds)
+    if bare.unidentifiable or burdened.unidentifiable or fewest <= constants:
         return None
     freedom = 2 * constants - len(fit.shared.names)
     arm = Prior.of(bare.names, bare.values, bare.covariance)
@@ -383,6 +376,7 @@ def repeatability(fit: Fit) -> tuple[FloatArray, float, tuple[float, float]] | N
         masses.append(fit.values[place] + float(np.sum(scores @ slope)) / information)
     freedom = len(masses) - 1
     std = float(np.std(masses, ddof=1))
-    low = std * float(np.sqrt(freedom / chi2_exceeded(freedom, 0.025)))
-    high = std * float(np.sqrt(freedom / chi2_exceeded(freedom, 0.975)))
+    low, high = (
+        std * float(np.sqrt(freedom / chi2_exceeded(freedom, tail))) for tail in (0.025, 0.975)
+    )
     return np.array(masses), std, (low, high)

@@ -126,6 +126,18 @@ class Fit:
             return ()
         return self.prior.absent
 
+    @property
+    def by_name(self) -> dict[str, tuple[float, float]]:
+        """Value and standard deviation of each parameter."""
+        pairs = zip(self.values.tolist(), self.std.tolist(), strict=True)
+        return dict(zip(self.names, pairs, strict=True))
+
+    @property
+    def determined(self) -> set[str]:
+        """Parameters that the logs determine, but for those that are nothing."""
+        known = np.array(self.names)[np.isfinite(self.std)]
+        return set(known.tolist()).difference(self.absent)
+
     @cached_property
     def std(self) -> FloatArray:
         """Standard deviations (Q,): infinite where a parameter is not identifiable."""

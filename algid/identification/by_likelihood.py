@@ -216,11 +216,11 @@ _REVISIONS = 3
 def _is_doubtful(fit: Fit) -> bool:
     """Whether a given length is outside the interval that the same likelihoods have for it."""
     free, given = fit.with_free_lengths, fit.shared.lengths
-    intervals = dict(zip(free.names, free.ci95.tolist(), strict=True))
-    return any(
-        not intervals[name][0] <= given[name] <= intervals[name][1]
-        for name in within(given, free.names)
-    )
+    for name in within(given, free.names):
+        length, std = free.by_name[name]
+        if abs(given[name] - length) > free.quantile * std:
+            return True
+    return False
 
 
 def finished(fit: Fit, settings: Settings) -> Fit:

@@ -26,9 +26,8 @@ horizontal plane.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import PurePath
-from typing import Literal
 
 import numpy as np
 
@@ -86,11 +85,10 @@ MOST = 0.5  # R² below which most of a torque is not the model's
 
 def doubted(found: Fitted) -> Fitted:
     """The fit with status WEAK_EXCITATION for k1 … k5 where a check doubts them."""
-    for check in CHECKS:
-        if check.consequence == "doubt":
-            for notice in check.find(found):
-                marked = found.fit.marked("WEAK_EXCITATION", RIGID)
-                found = replace(found, fit=marked.noted(notice))
+    for check in DOUBTS:
+        for notice in check(found):
+            marked = found.fit.marked("WEAK_EXCITATION", RIGID)
+            found = replace(found, fit=marked.noted(notice))
     return found
 
 
@@ -98,9 +96,8 @@ def remarks(found: Fitted) -> Iterator[Notice]:
     """What a user should know about a fit."""
     yield from found.fit.notes
     yield from found.fit.unidentifiable
-    for check in CHECKS:
-        if check.consequence == "remark":
-            yield from check.find(found)
+    for check in REMARKS:
+        yield from check(found)
 
 
 def exchanged(fit: Fit) -> float | None:
@@ -127,9 +124,8 @@ def _of_refuted(found: Fitted) -> Iterator[Notice]:
     in each other's place are.
     """
     fit, survey = found.fit, found.survey
-    if not (fit.refuted and found.settings.chooses) or exchanged(fit):
-        return
-    if "BROKEN_BOUND" in survey.accepted:
+    wanted = fit.refuted and found.settings.chooses and "BROKEN_BOUND" not in survey.accepted
+    if not wanted or exchanged(fit):
         return
     far = [one.bound for one in broken_bounds(fit) if (one.distance or 0.0) > FAR_BEYOND]
     if not far:
@@ -187,14 +183,13 @@ def _of_mass(found: Fitted) -> Iterator[Notice]:
     if K4 not in fit.names or K4 in fit.absent or by_constants is None:
         return
     length, std = by_constants
-    if LEAST_SURE * std < length:
-        values = dict(zip(fit.names, fit.values.tolist(), strict=True))
-        arm = abs(values[K4]) / (fit.shared.model.gravity * length)
-        mass = max(arm, values.get("m_p", 0.0))
-        if mass > STEEL * length**3:
-            numbers = {"case": "heavy", "mass": mass, "length": length}
-            milli = Remedy({"torque_unit": "mN m"}, "where torques are in mN m")
-            yield Notice("OTHER_UNIT", numbers=numbers, remedies=(milli,))
+    arm, _ = fit.by_name[K4]
+    payload, _ = fit.by_name.get("m_p", (0.0, 0.0))
+    mass = max(abs(arm) / (fit.shared.model.gravity * length), payload)
+    if LEAST_SURE * std < length and mass > STEEL * length**3:
+        numbers = {"case": "heavy", "mass": mass, "length": length}
+        milli = Remedy({"torque_unit": "mN m"}, "where torques are in mN m")
+        yield Notice("OTHER_UNIT", numbers=numbers, remedies=(milli,))
 
 
 def _of_gains(found: Fitted) -> Iterator[Notice]:
@@ -206,8 +201,8 @@ def _of_gains(found: Fitted) -> Iterator[Notice]:
     if "gain2" not in fit.names or has_code(fit.notes, "JOINTS_CONTRADICT"):
         return
     free = unshrunk(fit, "gain2")
-    place = free.names.index("gain2")
-    gain, half = float(free.values[place]), free.quantile * float(free.std[place])
+    gain, std = free.by_name["gain2"]
+    half = free.quantile * std
     if abs(gain) > half:
         numbers = {"ratio": 1 + gain, "half": half, "p_value": chance(abs(gain / half))}
         yield Notice("TORQUE_GAIN", numbers={"case": "joints"} | numbers)
@@ -218,8 +213,7 @@ def _of_payload(found: Fitted) -> Iterator[Notice]:
     fit = found.fit
     if "m_p" not in fit.names:
         return
-    place = fit.names.index("m_p")
-    low, high = fit.ci95[place].tolist()
+    low, high = fit.ci95[fit.names.index("m_p")].tolist()
     if np.isfinite(high) and low < 0 < high:
         yield Notice("NO_PAYLOAD", numbers={"most": high})
     elif np.isinf(high) and not fit.shared.lengths:
@@ -232,11 +226,10 @@ def _of_length(found: Fitted) -> Iterator[Notice]:
     l1 is g k1 / k2 of the constants, and both are the payload's.
     """
     fit, free = found.fit, found.fit.with_free_lengths
-    given, measured = fit.shared.lengths, list[tuple[str, float, float]]()
+    given = fit.shared.lengths
+    measured = [(name, *free.by_name[name]) for name in within(free.names, given)]
     if "l1" in given and (by_constants := length_by_constants(free)) is not None:
-        measured.append(("l1", *by_constants))
-    by_name = zip(free.names, free.values.tolist(), free.std.tolist(), strict=True)
-    measured += [one for one in by_name if one[0] in given]
+        measured.insert(0, ("l1", *by_constants))
     said = set[str]()
     for name, length, std in measured:
         numbers = contradicting(name, given[name], length, std, fit.quantile)
@@ -288,10 +281,9 @@ def _of_odd_logs(found: Fitted) -> Iterator[Notice]:
             continue
         rigid = np.flatnonzero(np.isin(own[0].names, RIGID))
         values = np.array([one.values for one in own])[:, rigid]
-        spread = np.array([one.quantile / NORMAL * one.std for one in own])
-        spread = np.hypot(spread[:, rigid], ALIKE * values)
-        apart = np.abs(values[:, None] - values)
-        distance = apart / np.hypot(spread[:, None], spread)
+        std = np.array([one.quantile / NORMAL * one.std for one in own])[:, rigid]
+        spread = np.hypot(std, ALIKE * values)
+        distance = np.abs(values[:, None] - values) / np.hypot(spread[:, None], spread)
         far = distance.max(axis=2)
         np.fill_diagonal(far, np.inf)
         middle = np.argsort(far, axis=1)[:, (len(own) - 2) // 2]  # of the others
@@ -310,39 +302,23 @@ def _of_odd_logs(found: Fitted) -> Iterator[Notice]:
             yield Notice("LOGS_APART", numbers=numbers)
 
 
-@dataclass(frozen=True)
-class Check:
-    """One check of a fit.
-
-    Parameters
-    ----------
-    code : of its notices
-    find : callable
-        Gives them.
-    consequence : "doubt" or "remark"
-        Whether k1 … k5 have no error bar then, or it is only said.
-    """
-
-    code: str
-    find: Callable[[Fitted], Iterator[Notice]]
-    consequence: Literal["doubt", "remark"] = "remark"
-
-
-CHECKS = (
-    Check("HARDLY_DRIVEN", _of_passive_joint, "doubt"),
-    Check("JOINTS_CONTRADICT", _of_refuted, "doubt"),
-    Check("GRAVITY_COMPENSATED", _of_gravity),
-    Check("PHASES", _of_phases),
-    Check("TORQUE_GAIN", _of_gains),
-    Check("OTHER_UNIT", _of_mass),
-    Check("NO_PAYLOAD", _of_payload),
-    Check("LENGTH_CONTRADICTED", _of_length),
-    Check("LOGS_APART", _of_arms),
-    Check("LOGS_APART", _of_odd_logs),
-)
-"""Checks of a finished fit, in order. What is checked while it is made has its share in
+Check = Callable[[Fitted], Iterator[Notice]]
+"""Gives notices of a finished fit. What is checked while it is made has its share in
 `algid.base.significance` too, and a consequence of its own: another estimate (REFUTED,
 INSTRUMENTS), or no result (BROKEN_BOUND)."""
+DOUBTS: tuple[Check, ...] = (_of_passive_joint, _of_refuted)
+"""Checks after which k1 … k5 have no error bar, in order."""
+REMARKS: tuple[Check, ...] = (
+    _of_gravity,
+    _of_phases,
+    _of_gains,
+    _of_mass,
+    _of_payload,
+    _of_length,
+    _of_arms,
+    _of_odd_logs,
+)
+"""Checks of which it is only said what they find, in order."""
 
 
 def fit_notes(fit: results.FitSummary) -> Iterator[Notice]:
@@ -389,16 +365,14 @@ def turn_note(fit: Fit, log: Recording) -> Iterator[Notice]:
     """
     from algid.inspection.conventions import zeroed
 
-    names = set(fit.names) - set(fit.absent)
-    if not {K1, K2, SINE_OF[K1], SINE_OF[K2]} <= names or fit.shared.model.gravity == 0:
+    if not {K1, K2, SINE_OF[K1], SINE_OF[K2]} <= fit.determined:  # of no arm without gravity
         return
 
-    def uncertain(name: str) -> bool:
+    def certain(name: str) -> bool:
         size, std = measured(fit, lambda beta: abs(phasor(fit.shared.model, beta, name)))
-        unknown = np.isinf(fit.std[[fit.names.index(name), fit.names.index(SINE_OF[name])]])
-        return bool(unknown.any()) or not size > LEAST_CERTAIN * std > 0
+        return size > LEAST_CERTAIN * std > 0
 
-    if uncertain(K1) or uncertain(K2):
+    if not (certain(K1) and certain(K2)):
         return
     turn, half = _angle(fit, K2, K1)
     if not abs(turn) - half > LEAST_TURN or abs(turn) + half >= np.pi:
@@ -428,7 +402,7 @@ NO_DAMPING = 0.02  # of critical damping: less than any joint's friction
 NO_ARM = 0.1  # of the loaded arm's inertia: less than any unloaded arm's
 
 Known = dict[str, tuple[float, float]]
-"""Values and standard deviations by name."""
+"""Values by name, and how far each may be off: `SURE` standard deviations."""
 
 
 def of_effort(fit: Fit, settings: Settings) -> tuple[Settings, list[Notice]]:
@@ -441,16 +415,16 @@ def of_effort(fit: Fit, settings: Settings) -> tuple[Settings, list[Notice]]:
     gravity, l1 = fit.shared.model.gravity, fit.shared.lengths.get("l1")
     if gravity > 0:
         # an arm with coupling but no weight, by unloaded logs alone, or else by the fit
-        sizes = [_size(unloaded or _of_fit(fit), name) for name in MOMENTS]
-        (k1, of_k1), (k2, of_k2), (k4, of_k4) = sizes
-        most, least = max(k2 + SURE * of_k2, k4 + SURE * of_k4), gravity * k1 / (l1 or BOTH_LONG)
-        if shown.effort is None and k1 > SURE * of_k1 and most < least:
+        arm = unloaded or _of_fit(fit)
+        (k1, off1), (k2, off2), (k4, off4) = (_size(arm, name) for name in MOMENTS)
+        weightless = max(k2 + off2, k4 + off4) < gravity * k1 / (l1 or BOTH_LONG)
+        if shown.effort is None and k1 > off1 and weightless:
             shown = shown.but(effort="gravity-compensated")
         if shown.effort == "gravity-compensated" and unloaded and loaded:
             # a payload with inertia about joint 1 but no weight
             z1, z4 = (loaded[name][0] - unloaded[name][0] for name in (K5, K4))
-            of_z1, of_z4 = (np.hypot(loaded[name][1], unloaded[name][1]) for name in (K5, K4))
-            if z1 > SURE * of_z1 and abs(z4) + SURE * of_z4 < gravity * z1 / (l1 or LONGEST):
+            off1, off4 = (np.hypot(loaded[name][1], unloaded[name][1]) for name in (K5, K4))
+            if z1 > off1 and abs(z4) + off4 < gravity * z1 / (l1 or LONGEST):
                 shown = shown.but(gravity=0.0)
                 notices.append(Notice("GRAVITY_COMPENSATED", numbers={"case": "payload"}))
     if settings.effort is not None:
@@ -473,9 +447,9 @@ def of_effort(fit: Fit, settings: Settings) -> tuple[Settings, list[Notice]]:
 
 def _external(unloaded: Known, loaded: Known) -> bool:
     """Whether unloaded logs have nothing of an arm in their torque, and loaded ones do."""
-    if not (unloaded and loaded) or not loaded[K5][0] > SURE * loaded[K5][1]:
+    if not (unloaded and loaded) or not loaded[K5][0] > loaded[K5][1]:
         return False
-    none = [abs(unloaded[k][0]) + SURE * unloaded[k][1] < NO_ARM * loaded[k][0] for k in (K3, K5)]
+    none = [abs(unloaded[k][0]) + unloaded[k][1] < NO_ARM * loaded[k][0] for k in (K3, K5)]
     return all(none)
 
 
@@ -486,26 +460,23 @@ def _without_friction(fit: Fit) -> bool:
     known = _of_fit(fit)
     k3, k4, k5 = (_size(known, name)[0] for name in (K3, K4, K5))
     most = NO_DAMPING * float(np.sqrt((k3 + k5) * k4))
-    for name in (K6, K7):
-        value, std = _size(known, name)
-        if value >= SURE * std or value + SURE * std >= most:
-            return False
-    return True
+    sizes = [_size(known, name) for name in (K6, K7)]
+    return all(value < off and value + off < most for value, off in sizes)
 
 
 def _size(known: Known, name: str) -> tuple[float, float]:
-    """Size of a constant, with its sine part where it has one, and its standard deviation.
+    """Size of a constant, with its sine part where it has one, and how far it may be off.
 
     Both are 0 without a column.
     """
-    value, std = known.get(name, (0.0, 0.0))
+    value, off = known.get(name, (0.0, 0.0))
     across, _ = known.get(SINE_OF.get(name, ""), (0.0, 0.0))
-    return float(np.hypot(value, across)), std
+    return float(np.hypot(value, across)), off
 
 
 def _of_fit(fit: Fit) -> Known:
-    """The fit's value of each parameter, with its standard deviation even where it is open."""
-    spreads = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    """The fit's value of each parameter, and how far it may be off even where it is open."""
+    spreads = SURE * np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     pairs = zip(fit.values.tolist(), spreads.tolist(), strict=True)
     return dict(zip(fit.names, pairs, strict=True))
 

@@ -295,12 +295,13 @@ def _terms(fit: Fit, chosen: Selection) -> Iterator[results.TermCriterion]:
 
 def _inverse(fit: Fit, name: str, over: float, unit: str) -> Estimate:
     """`over` a parameter, with its interval; unknown where that may be nothing or less."""
-    place = fit.names.index(name)
-    value, std = float(fit.values[place]), float(fit.std[place])
+    value, std = fit.by_name[name]
     half = fit.quantile * std
     if not np.isfinite(std) or value <= half:
         return unknown(unit)
-    found = estimate(over / value, over / value * std / value, 0.0, unit, fit.status[place])
+    found = estimate(
+        over / value, over / value * std / value, 0.0, unit, fit.status[fit.names.index(name)]
+    )
     return found.model_copy(update={"ci95": (over / (value + half), over / (value - half))})
 
 
