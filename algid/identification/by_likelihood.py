@@ -112,19 +112,16 @@ _OF_CONTROLLER = "kept: the logs leave open how late a controller that is faster
 
 def _by_first_pass(survey: Recordings, settings: Settings, hold: Hold) -> Selection:
     """The model asked for with the shape of friction, or the one that logs choose, of that hold."""
-    candidates: tuple[str, ...] = ()
-    if settings.chooses and settings.delay == 0:
-        candidates = CHOICE
-    elif settings.chooses:
-        candidates = without_delay(CHOICE)
+    candidates = CHOICE if settings.chooses else ()
+    if settings.delay != 0:
+        candidates = without_delay(candidates)
     plain = replace(_given(Model(gravity=settings.gravity), ()), hold=hold)
-    chosen = select(
+    return select(
         problem_of(survey, settings, plain),
         without_terms(settings.effort, candidates),
         settings.terms,
         absent(settings.effort, COLUMN_NAMES),
     )
-    return replace(chosen, hold=hold)
 
 
 def _given(model: Model, terms: Sequence[str]) -> Selection:
@@ -154,13 +151,8 @@ def run_fit(
     ------
     LogError
         If no log is long enough.
-    ValueError
-        If the settings' estimator gives time series.
     """
-    estimator = estimator_of(settings.estimator)
-    if estimator.settles:
-        raise ValueError(f"{estimator.name} gives time series, not a fit")
-    estimate = estimator.fit
+    estimate = estimator_of(settings.estimator).fit
 
     def most_likely(chosen: Selection, settings: Settings) -> tuple[Fit, Selection]:
         """The fit of the chosen terms, or of those that its own likelihood chooses."""
@@ -184,7 +176,7 @@ def run_fit(
     with long_enough(survey):
         # why no term is chosen but every one shrunk, if so
         notes: tuple[Notice, ...] = ()
-        if chosen.refuted and settings.chooses and estimator.name == "refined":
+        if chosen.refuted and settings.chooses and settings.estimator == "refined":
             notes = (Notice("REFUTED", numbers={"case": "noise", "kept": "weak"}),)
         else:
             fit, chosen = most_likely(chosen, settings)
@@ -200,13 +192,13 @@ def run_fit(
         picked = chosen
         if notes:
             fit, chosen = _shrunk(notes, survey, settings, chosen, prior)
-        elif fit.shared.model != chosen.model:
-            # the fit has estimated the width of friction's step
+        else:  # the fit has estimated the width of friction's step
             chosen = replace(chosen, model=fit.shared.model)
         fit, chosen = _of_motorless(fit, chosen, survey, settings, picked, prior)
         if fit.estimator == "instruments" and not chosen.shrunk:
             fit = robust.with_feedback_noted(fit, problem_of(survey, settings, chosen))
-    return Fitted(finished(fit, settings), survey, settings, chosen)
+    fit = finished(fit, settings)
+    return Fitted(fit, survey, settings.but(torque_hold=chosen.hold), chosen)
 
 
 _REVISIONS = 3

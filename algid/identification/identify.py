@@ -30,15 +30,16 @@ from algid.identification.recordings import (
 from algid.identification.series import residual_of, write_fit_series
 from algid.methods import estimator_of, settles
 from algid.model import Model
+from algid.notices import flat
 from algid.options import flag
 from algid.physics.effort import absent
+from algid.profile import Profile
 from algid.results import Result, read_result, write_result
 from algid.settings import DEFAULTS, OF_BOTH, OF_PRIOR, Settings
 
 if TYPE_CHECKING:
     from algid.identification.by_likelihood import Fitted
     from algid.notices import Notice
-    from algid.profile import Profile
 
 # the paper's convergence series is drawn beside other estimators up to this length of log
 SERIES_SECONDS = 600.0
@@ -123,20 +124,19 @@ def identify(
         logs are to be cross-validated of which there is one alone.
     """
     refuse_misleading(name)
-    settings = settings or Settings()
     earlier = Earlier.of(parameters)
-    meaning = profile
+    meaning = profile or Profile()
     if earlier is not None:
         meaning = reused(profile, earlier.result, earlier.file)
-    settings = _with_meaning(settings, meaning, earlier)
+    stated = meaning.model_dump(mode="json", exclude_unset=True)
+    settings = _with_meaning(settings or Settings(), meaning, earlier)
     sources = open_sources(unloaded, loaded, meaning)
     survey = Recordings(sources, progress, settings.gravity, settings.effort)
-    stated: dict[str, Any] = {}
-    if meaning is not None:
-        stated = meaning.model_dump(mode="json", exclude_unset=True)
-    usable, external = survey.unloaded, settings.effort == "external"
-    if external or earlier is not None:  # an external torque has nothing of the arm
-        usable = survey.loaded if external else list(survey.logs)
+    usable = survey.unloaded
+    if settings.effort == "external":  # which has nothing of the arm
+        usable = survey.loaded
+    elif earlier is not None:
+        usable = list(survey.logs)
     if not usable:
         alone = "none" if not survey.logs else f"{survey.logs[0].role} ones alone"
         raise SettingError(
@@ -172,7 +172,7 @@ def identify(
     return result
 
 
-def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier | None) -> Settings:
+def _with_meaning(settings: Settings, meaning: Profile, earlier: Earlier | None) -> Settings:
     """The settings, completed from the profile or an earlier result where they are not set."""
     names: tuple[str, ...] = (*OF_BOTH, *OF_PRIOR)
     if earlier is not None:
@@ -181,10 +181,9 @@ def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier 
                 f"{flag('prior')}: the arm is known by {flag('parameters')}; leave one of them out"
             )
         names = OF_BOTH
-    if meaning is not None:
-        unset = {name for name in names if getattr(settings, name) == DEFAULTS[name]}
-        stated = meaning.model_fields_set & unset
-        settings = settings.but(**{name: getattr(meaning, name) for name in stated})
+    unset = {name for name in names if getattr(settings, name) == DEFAULTS[name]}
+    stated = meaning.model_fields_set & unset
+    settings = settings.but(**{name: getattr(meaning, name) for name in stated})
     if settings.prior_error is not None and settings.prior is None:
         raise SettingError(
             f"{flag('prior_error')}: expected a prior that errs by as much, found none; give "
@@ -218,11 +217,8 @@ def _identified(
         result = judged(result, survey)
     notices = result.notices
     if earlier is not None:
-        notices = (
-            read_otherwise(result.logs, earlier.result, earlier.file)
-            + list(contradictions(earlier.result, settings.lengths))
-            + notices
-        )
+        of_logs = read_otherwise(result.logs, earlier.result, earlier.file)
+        notices = [*of_logs, *contradictions(earlier.result, settings.lengths), *notices]
     return result.model_copy(update={"profile": stated, "notices": notices})
 
 
@@ -255,14 +251,13 @@ def _by_likelihood(
     # the estimates, their statuses, and how well they predict
     survey.begin("prediction")
     result = outcome_of(found)
-    # gravity that is turned against θ1
+    # gravity that is turned against θ1, unless the caller, or the log itself, says its zero
     turned: Iterable[Notice] = ()
     log = survey.logs[0]
     reading = log.origin.reading
-    # what the caller, or the log itself, says that θ1 is measured from is not doubted
-    known = {"zero", "offsets"} & set(stated) or "offset" in (stated.get("theta1") or {})
-    known = known or reading.zero != "horizontal" or reading.offsets[0] != 0
-    if earlier is None and not known:
+    said_of_zero = {"zero", "offsets", "theta1.offset"}.intersection(flat(stated))
+    plain = reading.zero == "horizontal" and reading.offsets[0] == 0
+    if earlier is None and plain and not said_of_zero:
         turned = turn_note(found.fit, log)
     notices = [*turned, *result.notices, *of_driver]
     result = result.model_copy(update={"notices": notices})
@@ -291,12 +286,9 @@ def _fitted(survey: Recordings, settings: Settings, earlier: Earlier | None) -> 
     from algid.identification.by_likelihood import choose_model, run_fit
 
     survey.begin("choosing terms")
-    if earlier is None:
-        chosen, prior = choose_model(survey, settings, None), None
-    else:
-        chosen = choose_model(survey, settings, earlier.result)
+    chosen = choose_model(survey, settings, None if earlier is None else earlier.result)
+    prior = None
+    if earlier is not None:
         prior = prior_of(earlier.result, chosen.model, earlier.file)
     survey.begin("fitting")
-    settings = settings.but(torque_hold=chosen.hold)
-    found = run_fit(survey, settings, chosen, prior)
-    return replace(found, settings=settings.but(torque_hold=found.chosen.hold))
+    return run_fit(survey, settings, chosen, prior)

@@ -25,8 +25,8 @@ from algid.identification.known import FAR
 from algid.identification.recordings import Recordings
 from algid.identification.series import predictor_of_fit
 from algid.identification.validate import prediction, scores
-from algid.model import DELAYS, K4, UNITS, attributes
-from algid.notices import Notice, has_code, merged
+from algid.model import DELAYS, K4, SINE_OF, UNITS, attributes
+from algid.notices import Notice, codes_of, has_code, lossy, merged, of_codes
 from algid.physics.effort import absent
 from algid.results import Estimate, Result, Status
 from algid.results.verdict import LEAST_R2
@@ -85,7 +85,7 @@ def outcome_of(found: Fitted) -> Result:
     gone = set(fit.absent) | set(absent(settings.effort, CONSTANT_NAMES))
     # a constant that the model has no column for is not identifiable
     estimates = {name: unknown(UNITS[name]) for name in CONSTANT_NAMES}
-    estimates |= _estimates(fit, fit.status)
+    estimates |= _estimates(fit)
     parameters, payload = dict[str, Estimate](), dict[str, Estimate]()
     for name in outside(estimates, gone):
         group = payload if name in PAYLOAD_PARAMETERS else parameters
@@ -118,10 +118,10 @@ def outcome_of(found: Fitted) -> Result:
     return result
 
 
-def _estimates(fit: Fit, statuses: Sequence[str]) -> dict[str, Estimate]:
-    """Estimates of a fit by name, of those `statuses`."""
+def _estimates(fit: Fit) -> dict[str, Estimate]:
+    """Estimates of a fit by name."""
     estimates = {}
-    for name, value, std, status in zip(fit.names, fit.values, fit.std, statuses, strict=True):
+    for name, value, std, status in zip(fit.names, fit.values, fit.std, fit.status, strict=True):
         estimates[name] = estimate(value, std, fit.quantile * std, UNITS[name], status)
     return estimates
 
@@ -186,11 +186,7 @@ def fit_summary(found: Fitted) -> results.FitSummary:
         noise = dict(zip(("theta1", "theta2", "tau1", "tau2"), squares, strict=True))
     there, lost = places_outside(fit.names, fit.absent), np.isinf(fit.std)
     covariance = np.where(lost | lost[:, None], np.inf, fit.covariance)[np.ix_(there, there)]
-    by_log = []
-    for log in fit.each:
-        own = replace(log, quantile=fit.quantile)
-        statuses = np.where(np.isfinite(own.std), "OK", "NOT_IDENTIFIABLE").tolist()
-        by_log.append(_estimates(own, statuses))
+    by_log = [_estimates(replace(log, quantile=fit.quantile)) for log in fit.each]
     repeated = None
     if (scatter := repeatability(fit)) is not None:
         masses, std, ci95 = scatter
@@ -206,11 +202,10 @@ def fit_summary(found: Fitted) -> results.FitSummary:
         gain = _inverse(fit, "m_p", known, "1")
     whiteness = {}  # empty where no test was made
     if (tests := fit.whiteness) is not None:
-        for joint in range(2):
-            whiteness[f"tau{joint + 1}"] = results.WhitenessTest(
-                white=tests.joint_white[joint],
-                p_value=finite(float(tests.p_value[joint])),
-                lag1_correlation=float(tests.lag1[joint]),
+        numbers = zip(tests.joint_white, tests.p_value.tolist(), tests.lag1.tolist(), strict=True)
+        for name, (white, p, lag1) in zip(("tau1", "tau2"), numbers, strict=True):
+            whiteness[name] = results.WhitenessTest(
+                white=white, p_value=finite(p), lag1_correlation=lag1
             )
     bounds = []  # of physics that the estimates break beyond their 95 % intervals
     for one in broken_bounds(fit):
@@ -324,12 +319,11 @@ def _pulled_down(fit: results.FitSummary | None, count: int) -> list[bool]:
         return [False] * count
     if fit.model.chosen_by != "logs" or fit.broken_bounds or fit.residual.unexplained(LEAST_R2):
         return [False] * count
-    down = []
+    down, nothing = [], unknown(UNITS[K4])
     for own in fit.by_log:
-        along, across = own.get(K4), own.get(f"{K4}s")
-        turned = across.estimate or 0.0 if across is not None else 0.0
-        pull, std = (along.estimate, along.std) if along is not None else (None, None)
-        down.append(bool(pull and std and pull > max(FAR * std, abs(turned))))
+        along, across = own.get(K4, nothing), own.get(SINE_OF[K4], nothing)
+        least = max(FAR * (along.std or np.inf), abs(across.estimate or 0.0))
+        down.append((along.estimate or 0.0) > least)
     return down
 
 
@@ -348,24 +342,19 @@ def judged(result: Result, survey: Recordings) -> Result:
         replaced.append("DEGREES:reach")
     down = _pulled_down(fit, len(survey.logs))
     of_logs, other_arms, of_fit = list[Notice](), list[Notice](), result.notices
-    lost, wrong = False, {"WRONG_ZERO"} if turned else set()
     truth = survey.logs[0].origin.truth
     for log, is_down in zip(survey.logs, down, strict=True):
         for notice in survey.notices(log, doubtful=doubtful):
-            if notice.key in replaced or (is_down and notice.code in _OF_GRAVITY):
-                continue
-            of_logs.append(notice.of(PurePath(log.name).name))  # the paths stand among the logs
-            lost |= notice.lossy
-            other = notice.code == "OTHER_JOINTS" and bool(notice.numbers.get("swing", False))
-            if other or notice.code in CONTRADICTED:
-                wrong.add(notice.code)
+            if notice.key not in replaced and not (is_down and notice.code in _OF_GRAVITY):
+                of_logs.append(notice.of(PurePath(log.name).name))  # the paths stand among the logs
         own = log.origin.truth
         if truth and own and own.arm != truth.arm:  # another synthetic arm
             numbers = {"case": "metadata", "first": survey.logs[0].name}
             other_arms.append(Notice("OTHER_ARM", numbers=numbers, logs=(log.name,)))
     if has_code(of_logs, "WRONG_CONVENTION"):  # of which gravity that is turned is a part
         of_fit = [one for one in of_fit if one.code != "WRONG_ZERO"]
-        wrong.discard("WRONG_ZERO")
+    swings = [one for one in of_codes(of_logs, "OTHER_JOINTS") if one.numbers.get("swing")]
+    wrong = of_codes(of_logs, *CONTRADICTED) + of_codes(of_fit, "WRONG_ZERO") + swings
     notices = [*merged(of_logs), *other_arms, *of_fit]
-    result = result.model_copy(update={"data_lost": lost, "notices": notices})
-    return distrusted(result) if wrong - survey.accepted else result
+    result = result.model_copy(update={"data_lost": lossy(of_logs), "notices": notices})
+    return result if survey.accepted.issuperset(codes_of(wrong)) else distrusted(result)
