@@ -145,13 +145,13 @@ def summed(angles: Convention, logs: Sequence[Segment], model: Model) -> Convent
     def torques(piece: Segment, windows: Windows) -> FloatArray:
         return np.stack([windows.torque_moments(piece.tau)] * 2)
 
-    mapped = [replace(log, theta=angles.angles(log.theta)) for log in logs]
-    sources: list[Source] = [partial(list, [log]) for log in mapped]
+    sources: list[Source] = [
+        partial(list, [replace(log, theta=angles.angles(log.theta))]) for log in logs
+    ]
     settings = WeakSettings(model, WINDOW)
     speed = weak.speeds(sources, settings)
-    settings = replace(settings, rest=(AT_REST * speed[0], AT_REST * speed[1]))
-    every = [weak.normal_equations(source, settings, beside=torques) for source in sources]
-    normals = [normal for normal in every if normal is not None]
+    rest = (AT_REST * speed[0], AT_REST * speed[1])
+    normals = weak.normals_of(sources, replace(settings, rest=rest), beside=torques)
     if not normals:
         raise TooShortError(f"no {OF_A_WINDOW}")
     gram = np.sum([normal.gram.sum(axis=0) for normal in normals], axis=0)
@@ -186,13 +186,12 @@ def solved(
         size = np.sqrt(np.maximum(np.einsum("zii->zi", normal[:, :p, :p]), 1e-140))
         scale = size[:, :, None] * size[:, None, :]
         inverse = np.linalg.inv(normal[:, :p, :p] / scale + ridge) / scale
-        v = np.append(
-            -np.einsum("zij,zj->zi", inverse, normal[:, :p, p]), np.ones((len(gram), 1)), 1
-        )
-        acting = np.einsum("zaii,zi->za", gram[..., :p, :p], v[:, :p] ** 2)
+        c = np.einsum("zij,zj->zi", inverse, normal[:, :p, p])
+        acting = np.einsum("zaii,zi->za", gram[..., :p, :p], c**2)
         share = np.where(motorless, np.maximum(acting, _LEAST_POWER), power)
+        v = np.append(-c, np.ones((len(c), 1)), 1)
         squares = np.einsum("zi,zaij,zj->za", v, gram, v)
-        return -v[:, :p], np.maximum(squares, _FLOOR * share), share, inverse
+        return c, np.maximum(squares, _FLOOR * share), share, inverse
 
     def weigh(state: tuple[FloatArray, ...]) -> FloatArray:
         return sums.independent / state[1]

@@ -268,9 +268,8 @@ def ratio_of_joints(normals: Sequence[Normal], model: Model, unlike: float) -> f
     outweighs the joint that is driven.
     """
     shared = Shared(model)
-    for normal in normals:
-        if not normal.power.all():
-            return None  # without a motor a joint's equation is solved by nothing
+    if not np.all([normal.power for normal in normals]):
+        return None  # without a motor a joint's equation is solved by nothing
     both = np.flatnonzero(np.isin(model.names, (K1, K2, K3)))
 
     def of_joint(joint: int) -> tuple[FloatArray, FloatArray]:
@@ -281,9 +280,7 @@ def ratio_of_joints(normals: Sequence[Normal], model: Model, unlike: float) -> f
         own = alone(shared, [LogInformation(False, nothing, gram[:, :-1, :-1], gram[:, :-1, -1])])
         return own.values[both], own.covariance[np.ix_(both, both)]
 
-    f, F = of_joint(0)
-    s, S = of_joint(1)
-
+    (f, F), (s, S) = of_joint(0), of_joint(1)
     ratios = np.concatenate([[1.0], _RATIOS, -_RATIOS])
     size = np.sqrt(np.maximum(np.diag(S) + np.diag(F), 1e-300))
     apart = (s - ratios[:, None] * f) / size

@@ -121,13 +121,12 @@ def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
     """
     scales = [PARAMETERS[name].scale for name in names]
     sized = dict.fromkeys(scales + [VISCOUS], 0.0)
-    inertia = moment = 0.0  # the largest of the arm's own
+    arm = {INERTIA: 0.0, MOMENT: 0.0}  # the largest of its own
     for name, scale, value in zip(names, scales, np.abs(values).tolist(), strict=True):
         sized[scale] = max(sized[scale], value)
-        if name in RIGID and scale is INERTIA:
-            inertia = max(inertia, value)
-        elif name in RIGID and scale is MOMENT:
-            moment = max(moment, value)
+        if name in RIGID:
+            arm[scale] = max(arm[scale], value)
+    inertia, moment = arm.values()
     # With both lengths known the torque is linear in the payload, which may be none, and that be
     # known: its size is that of a mass which at 1 m loads the arm as much as it loads itself.
     if MASS in scales and LENGTH not in scales:

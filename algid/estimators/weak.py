@@ -104,12 +104,15 @@ def fit(problem: Problem) -> Fit:
 
 
 def normals_of(
-    sources: Sequence[Source], settings: WeakSettings, at: FloatArray | None = None
+    sources: Sequence[Source],
+    settings: WeakSettings,
+    at: FloatArray | None = None,
+    beside: Callable[[Segment, Windows], FloatArray] | None = None,
 ) -> list[Normal]:
     """Normal equations of the logs that are long enough for a window: see `normal_equations`."""
     normals = []
     for source in sources:
-        normal = normal_equations(source, settings, at)
+        normal = normal_equations(source, settings, at, beside=beside)
         if normal is not None:
             normals.append(normal)
     return normals

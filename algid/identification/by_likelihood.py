@@ -292,13 +292,7 @@ def _shrunk(
         # else by a likelihood that does not hold: a term takes up the delay
         shrunken = replace(shrunken, hold="foh")
     fit = robust.fit(problem_of(survey, settings, shrunken, prior))
-    terms = fit.shared.model.terms
-    if fit.shared.delay:
-        terms += DELAYS
-    shrunken = replace(
-        shrunken,
-        model=fit.shared.model,
-        delay=fit.shared.delay,
-        trials=tuple(TermTrial(term, True, np.nan, _SHRUNK) for term in terms),
-    )
+    terms = fit.shared.model.terms + (DELAYS if fit.shared.delay else ())
+    trials = tuple(TermTrial(term, True, np.nan, _SHRUNK) for term in terms)
+    shrunken = replace(shrunken, model=fit.shared.model, delay=fit.shared.delay, trials=trials)
     return replace(fit, notes=notes + fit.notes), shrunken

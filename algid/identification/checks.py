@@ -102,10 +102,8 @@ def remarks(found: Fitted) -> Iterator[Notice]:
 
 def exchanged(fit: Fit) -> float | None:
     """By how many standard deviations the unloaded arm carries more, if by far."""
-    for broken in broken_bounds(fit):
-        if broken.bound == "m_p >= 0" and (broken.distance or 0.0) > FAR:
-            return broken.distance
-    return None
+    far = {one.bound: one.distance for one in broken_bounds(fit) if (one.distance or 0.0) > FAR}
+    return far.get("m_p >= 0")
 
 
 def _of_passive_joint(found: Fitted) -> Iterator[Notice]:

@@ -144,13 +144,12 @@ def identify(
             f"{flag('effort')} external, found {alone}"
         )
     survey.count_once()
-    if settings.cross_validate:
-        for kind, logs in (("unloaded", survey.unloaded), ("loaded", survey.loaded)):
-            if len(logs) == 1:
-                raise SettingError(
-                    f"{flag('cross_validate')}: expected two {kind} logs or more, found one; give "
-                    "more, or leave it out"
-                )
+    for logs in (survey.unloaded, survey.loaded):
+        if settings.cross_validate and len(logs) == 1:
+            raise SettingError(
+                f"{flag('cross_validate')}: expected two {logs[0].role} logs or more, found one; "
+                "give more, or leave it out"
+            )
     if out is None:
         return _identified(survey, settings, earlier, stated)
     folder = result_folder(sources[0].name, Path(out), name)

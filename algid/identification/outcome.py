@@ -294,10 +294,13 @@ def _inverse(fit: Fit, name: str, over: float, unit: str) -> Estimate:
     half = fit.quantile * std
     if not np.isfinite(std) or value <= half:
         return unknown(unit)
-    found = estimate(
-        over / value, over / value * std / value, 0.0, unit, fit.status[fit.names.index(name)]
+    return Estimate(
+        estimate=finite(over / value),
+        std=finite(over / value * std / value),
+        ci95=(over / (value + half), over / (value - half)),
+        unit=unit,
+        status=Status(fit.status[fit.names.index(name)]),
     )
-    return found.model_copy(update={"ci95": (over / (value + half), over / (value - half))})
 
 
 CONTRADICTED = ("WRONG_CONVENTION", "LOST_SAMPLES")
