@@ -65,8 +65,7 @@ def design(
 ) -> Planned:
     """Plan the motion that tells most about an arm within its limits; write PRIOR.design.
 
-    Ctrl-C ends the search early and keeps the best motion so far. Exit code 3 tells that a
-    parameter stays open.
+    Exit code 3 tells that a parameter stays open.
 
     Parameters
     ----------

@@ -111,7 +111,6 @@ class Campaign:
         figure, A = self.asked.figure(information.S, stage.sharpness)
         used = usage(self.kept, slopes, self.loads)
         most, share = soft_maximum(used.u, stage.hardness)
-        assert used.by_motion is not None
         return Evaluation(
             figure,
             self.family.gradient(information.gradient(A), basis),

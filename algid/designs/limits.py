@@ -86,10 +86,6 @@ class Limits:
         allowed = {name: (1 - margin) * limit for name, limit in self.allowed.items()}
         return replace(self, allowed=allowed, height=height)
 
-    def height_of(self, theta: FloatArray) -> FloatArray:
-        """Height of the tip (...) in m at angles (2, ...)."""
-        return self.lengths[0] * np.sin(theta[0]) + self.lengths[1] * np.sin(theta[0] + theta[1])
-
 
 def _pair(value: Any, info: ValidationInfo) -> FloatArray:
     """Numbers (2,) of both joints or both kinds of run; of a range its ends (2, 2) by joint.
@@ -111,7 +107,7 @@ def _pair(value: Any, info: ValidationInfo) -> FloatArray:
     if table.shape[-1:] == (1,):
         table = table[..., 0]
     spans = name == "range" and table.shape == (2, 2)
-    low, high = table.T if spans else (-table, table)
+    ends = table if spans else np.stack([-table, table], axis=-1)
     like = EXAMPLES[name]
     if name == "runs":
         whole = (table == np.rint(table)) & (table >= 0) & (table <= MOST_RUNS)
@@ -119,18 +115,18 @@ def _pair(value: Any, info: ValidationInfo) -> FloatArray:
     else:
         sizes = np.abs(table[np.isfinite(table) & (table != 0)])
         most = FURTHEST if name == "range" else LARGEST
-        right = bool(np.all(low < high) and np.all((sizes >= SMALLEST) & (sizes <= most)))
-        right = right and np.array_equal(np.isfinite(low), np.isfinite(high))
-        right = right and low.shape in ((), (1,), (2,))
+        right = bool(
+            ends.shape in ((2,), (1, 2), (2, 2))
+            and np.all(ends[..., 0] < ends[..., 1])
+            and np.all((sizes >= SMALLEST) & (sizes <= most))
+            and not np.any(np.diff(np.isfinite(ends)))
+        )
         like = f"{like}; from {SMALLEST:g} to {most:.4g}, or inf"
     if not right:
         raise PydanticCustomError("limit", "expected {like}", {"like": like})
     if name != "range":
         return np.broadcast_to(table, 2)
-    if spans:
-        return table
-    half, middle = np.broadcast_to(table, 2), np.array(HANGING)
-    return np.stack([middle - half, middle + half], axis=1)
+    return ends if spans else np.array(HANGING)[:, None] + ends
 
 
 Pair = Annotated[FloatArray, PlainValidator(_pair)]
@@ -210,7 +206,7 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
 
 @dataclass(frozen=True)
 class Row:
-    """A limit and its side: flag, joint, whether the upper end, and for torque whether loaded.
+    """A limit and its side: flag, joint, and for torque whether loaded.
 
     `allowed` is the limit in its unit and with its sign, of which nothing is used at `still`.
     """
@@ -219,7 +215,6 @@ class Row:
     joint: int | None
     allowed: float
     still: float = 0.0
-    upper: bool = True
     loaded: bool | None = None
 
     def reached(self, used: float) -> float:
@@ -237,7 +232,7 @@ class Row:
         """Where it is: a joint, and which way."""
         if self.joint is None:
             return ""
-        return f"joint {self.joint + 1}, {'up' if self.upper else 'down'}"
+        return f"joint {self.joint + 1}, {'up' if self.allowed > self.still else 'down'}"
 
     def __str__(self) -> str:
         return f"{self.kind} of {self.place}" if self.place else self.kind
@@ -245,20 +240,19 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Usage:
-    """Constraint use u (m, N) along a motion, its rows, and derivatives (m, 6, N) by the motion."""
+    """Constraint use u (m, N) along a motion, its rows, and derivatives (m, 6, N) by the motion.
+
+    The derivatives of torques are zero where they were not asked for.
+    """
 
     rows: tuple[Row, ...]
     u: FloatArray
-    by_motion: FloatArray | None = None
+    by_motion: FloatArray
 
     @property
     def most(self) -> FloatArray:
         """Largest usage (m,) of each row."""
         return self.u.max(axis=1)
-
-
-_Use = tuple[Row, FloatArray, FloatArray]
-"""A limit, its use (N,), and the derivatives (6, N) of that by the motion."""
 
 
 def usage(
@@ -274,52 +268,44 @@ def usage(
         Of the motion, at N instants.
     loads : sequence of Load
     derivatives : bool
-        Whether the derivatives by the motion are asked for too.
+        Whether the torques' derivatives by the motion are asked for too.
     """
-    uses = list(_kinematic(limits, slopes.motion))
-    for load in loads:
-        uses += _torque(limits.allowed["torque"], slopes, load, derivatives)
-    rows, values, by_motion = zip(*uses, strict=True)
-    return Usage(rows, np.array(values), np.array(by_motion) if derivatives else None)
-
-
-def _kinematic(limits: Limits, motion: Motion) -> Iterator[_Use]:
-    kinds = {"range": motion.theta - limits.middle[:, None], "speed": motion.omega}
-    kinds["acceleration"] = motion.alpha
-    for order, (name, values) in enumerate(kinds.items()):
-        limit = limits.allowed[name]
-        for joint in np.flatnonzero(np.isfinite(limit)).tolist():
-            for sign in (1.0, -1.0):
-                slope = np.zeros((COMPONENTS, values.shape[1]))
-                slope[2 * order + joint] = sign / limit[joint]
-                still = float(limits.middle[joint]) if name == "range" else 0.0
-                row = Row(name, joint, still + sign * float(limit[joint]), still, sign > 0)
-                yield row, sign * values[joint] / limit[joint], slope
+    motion, uses = slopes.motion, []
+    theta, nothing = motion.theta, np.zeros((COMPONENTS, motion.theta.shape[1]))
+    of_component = np.eye(COMPONENTS)[:, :, None]
+    for order, (name, values) in enumerate(
+        (("range", theta), ("speed", motion.omega), ("acceleration", motion.alpha))
+    ):
+        for joint, sign, limit in _sides(limits.allowed[name]):
+            still = float(limits.middle[joint]) if name == "range" else 0.0
+            row = Row(name, joint, still + sign * limit, still)
+            slope = nothing + sign / limit * of_component[2 * order + joint]
+            uses.append((row, sign * (values[joint] - still) / limit, slope))
     if np.isfinite(limits.height):
-        l1, l2 = limits.lengths
-        room = l1 + l2 - limits.height
-        both = motion.theta[0] + motion.theta[1]
-        slope = np.zeros((COMPONENTS, both.size))
-        slope[0] = -(l1 * np.cos(motion.theta[0]) + l2 * np.cos(both)) / room
-        slope[1] = -l2 * np.cos(both) / room
-        used = (l1 + l2 - limits.height_of(motion.theta)) / room
-        row = Row("tip-height", None, limits.height, float(l1 + l2), upper=False)
-        yield row, used, slope
+        (l1, l2), both = limits.lengths, theta[0] + theta[1]
+        room, height = l1 + l2 - limits.height, l1 * np.sin(theta[0]) + l2 * np.sin(both)
+        second = l2 * np.cos(both)
+        slope = np.stack([l1 * np.cos(theta[0]) + second, second, *nothing[2:]]) / -room
+        row = Row("tip-height", None, limits.height, float(l1 + l2))
+        uses.append((row, (l1 + l2 - height) / room, slope))
+    for load in loads:
+        torque, more, by_Y = load.largest(slopes.Y)
+        for joint, sign, limit in _sides(limits.allowed["torque"]):
+            slope = nothing
+            if derivatives:
+                to_Y = (sign * load.c[:, None] + by_Y[joint]) / limit
+                slope = np.einsum("qn,cqn->cn", to_Y, slopes.dY[:, joint])
+            row = Row("torque", joint, sign * limit, loaded=load.loaded)
+            uses.append((row, (sign * torque[joint] + more[joint]) / limit, slope))
+    rows, used, by_motion = zip(*uses, strict=True)
+    return Usage(rows, np.array(used), np.array(by_motion))
 
 
-def _torque(
-    limit: FloatArray, slopes: Sensitivities, load: Load, derivatives: bool
-) -> Iterator[_Use]:
-    torque, more, by_Y = load.largest(slopes.Y)
+def _sides(limit: FloatArray) -> Iterator[tuple[int, float, float]]:
+    """Joint, sign and size of each side that is limited."""
     for joint in np.flatnonzero(np.isfinite(limit)).tolist():
         for sign in (1.0, -1.0):
-            values = (sign * torque[joint] + more[joint]) / limit[joint]
-            slope = np.zeros((COMPONENTS, values.size))
-            if derivatives:
-                to_Y = (sign * load.c[:, None] + by_Y[joint]) / limit[joint]
-                slope = np.einsum("qn,cqn->cn", to_Y, slopes.dY[:, joint])
-            allowed = sign * float(limit[joint])
-            yield Row("torque", joint, allowed, 0.0, sign > 0, load.loaded), values, slope
+            yield joint, sign, float(limit[joint])
 
 
 def resting(limits: Limits, model: Model, loads: Sequence[Load]) -> FloatArray:
@@ -332,8 +318,8 @@ def resting(limits: Limits, model: Model, loads: Sequence[Load]) -> FloatArray:
     """
     half = limits.allowed["range"]
     reach = np.where(np.isfinite(half), half, _WIDE)
-    first, second = np.linspace(limits.middle - reach, limits.middle + reach, _STEPS, axis=1)
-    theta = np.stack([np.repeat(first, _STEPS), np.tile(second, _STEPS)])
+    angles = np.linspace(limits.middle - reach, limits.middle + reach, _STEPS, axis=1)
+    theta = np.stack(np.meshgrid(*angles, indexing="ij")).reshape(2, -1)
     still = Motion(theta, np.zeros_like(theta), np.zeros_like(theta))
     used = usage(limits, Sensitivities(model, still, 1.0), loads, derivatives=False)
     most = used.u.max(axis=0)
@@ -342,12 +328,12 @@ def resting(limits: Limits, model: Model, loads: Sequence[Load]) -> FloatArray:
         return theta[:, central]
     if most[best] < 1:
         return theta[:, best]
-    other = np.array([row.limit != "range" for row in used.rows])
-    most = np.where(other[:, None], used.u, -np.inf).max(axis=0)
-    best = int(np.argmin(most))
-    row = used.rows[int(np.argmax(np.where(other, used.u[:, best], -np.inf)))]
+    others = [place for place, row in enumerate(used.rows) if row.limit != "range"]
+    u = used.u[others]
+    at_best = u[:, np.argmin(u.max(axis=0))]
+    row = used.rows[others[np.argmax(at_best)]]
     raise SettingError(
         f"{flag(row.limit.replace('-', '_'))}: even at rest, wherever within {flag('range')}, "
-        f"{row}, takes {100 * float(most[best]):.4g} % of its limit (margin included); allow more, "
+        f"{row}, takes {100 * at_best.max():.4g} % of its limit (margin included); allow more, "
         f"or move or widen {flag('range')}"
     )

@@ -111,8 +111,7 @@ _DONE = 1e-5  # change of the figure at which a stage ends
 _HALVINGS = 24
 _HOPELESS = 1e6
 _EASY = 0.8  # usage of the limits that a random start leaves halfway to one
-STARTS = 4  # random motions that the search starts from
-KEPT = 1  # of them, that go on to the later stages
+STARTS = 4  # random motions that the search starts from; the best goes on to the later stages
 
 
 @dataclass(frozen=True)
@@ -155,7 +154,7 @@ def optimise(
     """
     from scipy.optimize import minimize
 
-    total = STARTS * FIRST.iterations + KEPT * sum(stage.iterations for stage in LATER)
+    total = STARTS * FIRST.iterations + sum(stage.iterations for stage in LATER)
     done = 0
     judged: dict[float, FloatArray] = {}
 
@@ -178,30 +177,26 @@ def optimise(
 
         # SLSQP asks for the figure, the limits and their gradients at one x after another
         @lru_cache(maxsize=1)
-        def evaluated(key: bytes) -> Evaluation:
-            x = np.frombuffer(key)
+        def at(*x: float) -> Evaluation:
             with suppress(np.linalg.LinAlgError):
-                found = campaign.evaluate(x, stage)
+                found = campaign.evaluate(np.array(x), stage)
                 if np.isfinite(found.figure) and np.all(np.isfinite(found.room)):
                     return found
             # a step so long that nothing can be said of the motion is one to be shortened
             room = np.full(rows, -_HOPELESS)
-            return Evaluation(_HOPELESS, np.zeros(x.size), room, np.zeros((rows, x.size)))
-
-        def at(x: FloatArray) -> Evaluation:
-            return evaluated(x.tobytes())
+            return Evaluation(_HOPELESS, np.zeros(len(x)), room, np.zeros((rows, len(x))))
 
         rows = 1
-        rows = at(x).room.size
+        rows = at(*x).room.size
         start = done
         ended = minimize(
-            lambda x: at(x).figure,
+            lambda x: at(*x).figure,
             x,
-            jac=lambda x: at(x).gradient,
+            jac=lambda x: at(*x).gradient,
             constraints={
                 "type": "ineq",
-                "fun": lambda x: at(x).room,
-                "jac": lambda x: at(x).room_gradient,
+                "fun": lambda x: at(*x).room,
+                "jac": lambda x: at(*x).room_gradient,
             },
             method="SLSQP",
             callback=step,
@@ -215,11 +210,10 @@ def optimise(
     ends = []
     for _ in range(STARTS):
         ends.append(run(kept(campaign, campaign.random(rng), FIRST.rate, room), FIRST))
-    for end in sorted(ends, key=score)[:KEPT]:
-        better = end
-        for stage in LATER:
-            better = run(better, stage)
-            score(better)
+    better = min(ends, key=score)
+    for stage in LATER:
+        better = run(better, stage)
+        score(better)
     return judged[min(judged)]
 
 
@@ -229,18 +223,22 @@ def kept(campaign: Campaign, x: FloatArray, rate: float, most: float = 1.0) -> F
     A small one is enlarged to that.
     """
     rest = campaign.rest
+
+    def drawn(share: float) -> FloatArray:
+        return rest + share * (x - rest)
+
     low, high = 0.0, 1.0
-    while most < 1.0 and campaign.excess(rest + high * (x - rest), rate) < most and high < 1e3:
+    while most < 1.0 and campaign.excess(drawn(high), rate) < most and high < 1e3:
         low, high = high, 2 * high
-    if campaign.excess(rest + high * (x - rest), rate) <= most:
-        return rest + high * (x - rest)
+    if campaign.excess(drawn(high), rate) <= most:
+        return drawn(high)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        if campaign.excess(rest + middle * (x - rest), rate) <= most:
+        if campaign.excess(drawn(middle), rate) <= most:
             low = middle
         else:
             high = middle
-    return rest + low * (x - rest)
+    return drawn(low)
 
 
 def soft_maximum(u: FloatArray, hardness: float) -> tuple[FloatArray, FloatArray]:

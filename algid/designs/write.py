@@ -77,19 +77,17 @@ def joint_trajectory(design: Planned) -> str:
         "points:",
     ]
     motion = design.motion
+    signals = {
+        "- positions": motion.theta,
+        "  velocities": motion.omega,
+        "  accelerations": motion.alpha,
+    }
     for place in places:
-        nanoseconds = round(float(design.t[place]) * 1e9)
-        lines += [
-            f"- positions: {_numbers(motion.theta[:, place])}",
-            f"  velocities: {_numbers(motion.omega[:, place])}",
-            f"  accelerations: {_numbers(motion.alpha[:, place])}",
-            f"  time_from_start: {{sec: {nanoseconds // 10**9}, nanosec: {nanoseconds % 10**9}}}",
-        ]
+        for name, signal in signals.items():
+            lines.append(f"{name}: {(signal[:, place].round(9) + 0.0).tolist()}")
+        seconds, nanoseconds = divmod(round(float(design.t[place]) * 1e9), 10**9)
+        lines.append(f"  time_from_start: {{sec: {seconds}, nanosec: {nanoseconds}}}")
     return "\n".join(lines) + "\n"
-
-
-def _numbers(values: FloatArray) -> str:
-    return str([round(float(value), 9) + 0.0 for value in values])
 
 
 def design_json(design: Planned) -> str:

@@ -36,6 +36,7 @@ from algid.signals.segments import Segment
 
 COULOMB = TERMS["coulomb"]
 FRICTION = (K6, K7) + COULOMB.names
+LENGTHS = ("l1", "l2")
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +97,10 @@ class IdentifiedArm:
         """Derivatives (2 + b, q) of `unit` by l1, l2 and the payload's body."""
         return self.shared.jacobian(self.beta, True).T[self.k.size + 1 :]
 
+    def times(self, piece: Segment) -> FloatArray:
+        """Stamps (n,) in s of a piece's torques whose stencil lies within its angles."""
+        return piece.t[Stencil(piece.dt, self.shift).torques(len(piece))]
+
     def linearised(self, piece: Segment, c: FloatArray, *, settle: bool = True) -> Linearised:
         """A piece of log, linearised at the coefficients `c` and whitened.
 
@@ -111,11 +116,10 @@ class IdentifiedArm:
         return linearise(self.model, c, theta, piece, stencil, self.noise)
 
 
-def arm_of(
-    result: Result, first: Segment, l1: float | None = None, l2: float | None = None
-) -> tuple[IdentifiedArm, FloatArray]:
+def arm_of(result: Result, first: Segment, **given: float) -> tuple[IdentifiedArm, FloatArray]:
     """The arm of a result with link lengths from it or given, and the covariance (p, p) of both.
 
+    A given length goes before the one that the result was made with, and that before its estimate.
     After the q coefficients come l1, l2 and the payload's body. The model
     always has Coulomb friction, zero with no error where the result has none: friction may drift.
 
@@ -135,41 +139,35 @@ def arm_of(
     prior = prior_of(result, model)
     if COULOMB.name not in model.terms:
         model = replace(model, terms=model.terms + (COULOMB.name,))
-    payload = {name: float(one.estimate or 0.0) for name, one in result.payload.items()}
-    m_p, J = payload.get("m_p", 0.0), payload.get("J_p", 0.0)
-    value = dict(zip(prior.names, prior.mean, strict=True)) | {"m_p": 1.0}
-    if not set(SINES).isdisjoint(model.names):
-        value["y_p"] = payload.get("y_p", 0.0)
-    if m_p > 0:
-        value["J_p"] = max(J, 0.0) / m_p
+    estimates = {
+        name: one.estimate for name, one in result.payload.items() if one.estimate is not None
+    }
+    m_p, J = estimates.get("m_p", 0.0), estimates.get("J_p", 0.0)
+    stated = {name: result.settings[name] for name in LENGTHS if result.settings.get(name)}
+    value = dict(zip(prior.names, prior.mean, strict=True)) | estimates | stated | given
+    value |= {"m_p": 1.0, "J_p": max(J, 0.0) / m_p if m_p > 0 else 0.0}
+    if set(SINES).isdisjoint(model.names):
+        value["y_p"] = 0.0
     known = with_error_bar(result, BODY_PARAMETERS) if m_p else ()
     body = tuple(name for name in BODY_PARAMETERS if value.get(name) or name in known)
     shared = Shared(model, payload=True, body=body)
     names, mass = shared.names, len(model.names)
     kept = outside(names, ("m_p",))
     T = np.delete(np.eye(len(names)), mass, axis=0)
-    uncertain = set(prior.names + known)
+    uncertain = {*prior.names, *known, *with_error_bar(result, outside(LENGTHS, given))}
     if "J_p" in known:  # of each kilogram: the derivatives of J_p / m_p
         T[kept.index("J_p"), [names.index("J_p"), mass]] = 1 / m_p, -J / m_p**2
         if "m_p" in result.fit.covariance_names:
             uncertain.add("m_p")
-    lengths = {"l1": l1, "l2": l2}
-    uncertain.update(name for name in with_error_bar(result, lengths) if lengths[name] is None)
-    if l1 is None and result.settings.get("l1") is None and payload_length(result) is None:
+    if "l1" not in stated | given and payload_length(result) is None:
         constants = by_constants(result)
         if constants is not None and constants[0] > 0:
-            lengths["l1"], _, slopes = constants
+            value["l1"], _, slopes = constants
             T[kept.index("l1")] = vector(names, slopes, otherwise=0.0)
-    for name, given in lengths.items():
-        # the one given, else the one the result was made with, else its estimate
-        estimate = result.payload[name].estimate if name in result.payload else None
-        stated = [one for one in (given, result.settings.get(name), estimate) if one is not None]
-        if not stated:
-            raise ResultError(
-                f"{result.log.path}: its result has no {name}; give the link's length with "
-                f"{flag(name)}"
-            )
-        value[name] = float(stated[0])
+    for name in outside(LENGTHS, value):
+        raise ResultError(
+            f"{result.log.path}: its result has no {name}; give the link's length with {flag(name)}"
+        )
     arm = IdentifiedArm(
         shared,
         vector(names, value, otherwise=0.0),

@@ -27,7 +27,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.base.names import names_in, outside
-from algid.signals.differences import POINTS, Stencil
+from algid.signals.differences import POINTS
 from algid.signals.segments import Segment, pieces
 from algid.tracks.arm import IdentifiedArm
 
@@ -94,10 +94,6 @@ class Cells:
         E = self.E - np.einsum("ci,ci->c", x, 2 * self.b - Mx)
         return replace(self, b=self.b - Mx, E=E)
 
-    def squares(self, mass: float | FloatArray) -> FloatArray:
-        """Σ (e − g m_p)² (C,): what a payload of `mass` kg, one or (C,), leaves."""
-        return np.asarray(self.E - 2 * mass * self.B + mass**2 * self.A)
-
 
 SUMS = outside(names_in(fields(Cells)), ("U",))
 
@@ -127,8 +123,7 @@ def cells_of(
         Y = Y[:, :-1]
         torque = e + arm.k @ Y
         z = U @ Y
-        given = Stencil(piece.dt, arm.shift).torques(len(piece))
-        start = piece.start + piece.dt * (given.start + step * np.arange(count))
+        start = arm.times(piece)[: count * step : step]
         cells.append(
             Cells(
                 start,

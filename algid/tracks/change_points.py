@@ -122,11 +122,11 @@ def excess(
     factor = 1.0
     for span in spans:
         starts = np.concatenate([np.arange(a, b - span + 1, span) for a, b in parts])
-        part = np.repeat(np.arange(len(parts)), [max(0, (b - a) // span) for a, b in parts])
         ends = starts + span
         information, score = sums(A, starts, ends), sums(B, starts, ends)
         heavy = information > LIGHTEST * information.max(initial=0.0)
-        neighbours = heavy[1:] & heavy[:-1] & (np.diff(part) == 0)
+        within = np.isin(starts[1:], [a for a, _ in parts], invert=True)
+        neighbours = heavy[1:] & heavy[:-1] & within
         if neighbours.sum() < FEWEST:
             continue
         information = np.maximum(information, 1e-300)

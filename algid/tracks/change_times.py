@@ -104,11 +104,8 @@ class Rows:
 
 def step_response(u: FloatArray) -> FloatArray:
     """h: what differences of a motion see, u samples behind a step of its acceleration."""
-    weights = Stencil(1.0).weights[2]
-    points = np.arange(POINTS) - POINTS // 2
-    h = np.zeros(u.shape)
-    for weight, point in zip(weights, points, strict=True):
-        h += weight * 0.5 * np.maximum(u + point, 0.0) ** 2
+    behind = np.maximum(np.add.outer(np.arange(POINTS) - POINTS // 2, u), 0.0)
+    h = np.tensordot(Stencil(1.0).weights[2], 0.5 * behind**2, axes=1)
     return np.where(u > POINTS, 1.0, h)
 
 
@@ -120,8 +117,7 @@ def rows_of(
     masses: Sequence[float],
 ) -> Rows:
     """Rows of a piece with payloads of `masses` kg that change at the known `moments` in s."""
-    given = Stencil(piece.dt, arm.shift).torques(len(piece))
-    t = piece.start + piece.dt * np.arange(given.start, given.stop) + arm.shift
+    t = arm.times(piece) + arm.shift
     mass = np.asarray(masses)[np.searchsorted(np.asarray(moments), t, side="right")]
     # Each row at its own mass and friction: the angles' noise passes through the torque's partial
     # derivatives, which are theirs.
@@ -289,8 +285,8 @@ def windows(
         given = Stencil(segment.dt, shift).torques(_FAR)  # the others serve the stencil
         for at, span in enumerate(spans):
             start, end = ((time - segment.start) / segment.dt for time in span)
-            first = min(max(round(start) - given.start, 0), len(segment))
-            last = min(max(round(end) + _FAR - given.stop, 0), len(segment))
+            reach = round(start) - given.start, round(end) + _FAR - given.stop
+            first, last = np.clip(reach, 0, len(segment)).tolist()
             if at in held and not (segment.continues and first < last):
                 yield at, held.pop(at)
             if first < last:

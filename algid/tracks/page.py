@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from algid.base.criteria import HOLE
+from algid.base.names import concatenated, rows_of
 from algid.base.significance import NORMAL
 from algid.base.text import cells, counted, file_name, joined, resolved, significant
 from algid.notices import Notice, Verdict, graded, lossy, notes_of, warnings_of
@@ -19,7 +20,7 @@ from algid.report.document import Document, Section, Table
 from algid.report.export import write_mcap
 from algid.report.plot import Panels
 from algid.report.render import markdown, page, write_texts
-from algid.report.series import reduced
+from algid.report.series import Block, reduced
 from algid.report.tables import log_tables, provenance_table, settings_table
 from algid.results.verdict import LEAST_R2, WORST_R2, share_text, wrong_length
 from algid.tracks.cells import CELL
@@ -215,12 +216,11 @@ def payload_figure(result: TrackResult) -> Panels:
     size = max(1, -(-2 * track.t.size // POINTS))
     # lines break at holes and between stretches
     apart = np.flatnonzero((np.diff(track.stretch) != 0) | (np.diff(track.t) > HOLE + CELL)) + 1
-    parts = []
-    for part in zip(*(np.split(values, apart) for values in curve.values()), strict=True):
-        drawn = np.array(list(reduced(dict(zip(curve, part, strict=True)), size).values()))
-        parts += [drawn, np.full((len(curve), 1), np.nan)]
-        parts[-1][0] = drawn[0, -1]
-    t, low, m_p, high, left = np.concatenate(parts, axis=1)
+    parts = list[Block]()
+    for part in np.split(np.arange(track.t.size), apart):
+        drawn = reduced(rows_of(curve, part), size)
+        parts += [drawn, dict.fromkeys(curve, np.full(1, np.nan)) | {"t": drawn["t"][-1:]}]
+    t, low, m_p, high, left = concatenated(parts).values()
     panels.band(0, t, low, high, "its 95 % band")
     panels.add(0, t, m_p, f"m_p(t) from ± {HALF_BAND:g} s around")
     ends = np.array([[one.start, one.end] for one in stretches]).ravel()

@@ -31,7 +31,7 @@ from algid.identification.recordings import LogLike, Recordings, open_source
 from algid.notices import Notice, lossy, merged
 from algid.results import Result, read_result, result_json
 from algid.signals.segments import Segment
-from algid.tracks.arm import IdentifiedArm, arm_of
+from algid.tracks.arm import LENGTHS, IdentifiedArm, arm_of
 from algid.tracks.cells import CELL, Cells, cells_of, joined
 from algid.tracks.change_points import (
     AHEAD,
@@ -87,7 +87,8 @@ def track_log(
     first = next(survey.segments(source), None)
     if first is None:
         raise LogError(f"{source.name}: it holds no samples; record longer")
-    arm, covariance = arm_of(as_logged(result, profile), first, l1, l2)
+    given = {name: one for name, one in zip(LENGTHS, (l1, l2), strict=True) if one is not None}
+    arm, covariance = arm_of(as_logged(result, profile), first, **given)
     try:
         with one_blas_thread():
             weighed = track(partial(survey.segments, source), arm, covariance)
@@ -99,14 +100,13 @@ def track_log(
     if judged.grade != "good":
         numbers = {"grade": judged.word.lower(), "headline": judged.headline}
         notices.append(Notice("ARM_DOUBTFUL", numbers=numbers))
-    lengths = {name: one for name, one in (("l1", l1), ("l2", l2)) if one is not None}
-    notices += contradictions(result, lengths)
+    notices += contradictions(result, given)
     notices += read_otherwise([survey.summary(source)], result, called)
     notices += merged(of_log)
     schedule = None
     if truth is not None:
         schedule = truth.schedule or ((0.0, truth.payload),)
-    own_settings = {name: arm.value(name) for name in ("l1", "l2")}
+    own_settings = {name: arm.value(name) for name in LENGTHS}
     own_settings["gravity"] = arm.model.gravity
     return TrackResult(
         track=weighed,
@@ -185,7 +185,7 @@ def _weigh(
     parts = list(pairwise(places.tolist()))
     slow = excess(calm.A, calm.B, parts, known=(T, covariance), robust=False)
     colour = max(rough_variance(calm), slow)
-    squares = calm.squares(masses)
+    squares = calm.less(masses[:, None] * np.eye(1, calm.b.shape[1])).E
     own = np.add.reduceat(squares, starts) / (np.add.reduceat(calm.rows, starts) - 1)
     noise = np.maximum(own, colour)  # a stretch's own, or the log's where that is larger
     J = np.add.reduceat(T, starts) / information[:, None]

@@ -10,7 +10,6 @@ from algid.arm import FloatArray
 from algid.designs.campaign import Campaign
 from algid.designs.search import (
     FIRST,
-    KEPT,
     LATER,
     STARTS,
     Evaluation,
@@ -61,7 +60,7 @@ def test_the_search_finds_the_nearest_point_within_limits() -> None:
     x = optimise(Ball(TARGET), 100.0, 0, lambda *call: calls.append(call))
     np.testing.assert_allclose(x, np.clip(TARGET, -1, 1), atol=1e-5)
     assert np.abs(x).max() <= 1.0
-    total = STARTS * FIRST.iterations + KEPT * sum(stage.iterations for stage in LATER)
+    total = STARTS * FIRST.iterations + sum(stage.iterations for stage in LATER)
     assert {stage for stage, _, _ in calls} == {"searching"}
     assert {of for _, _, of in calls} == {total}
     done = [count for _, count, _ in calls]
