@@ -58,12 +58,11 @@ class Load:
         torque = np.einsum("aqn,q->an", Y, self.c)
         varied = np.einsum("aqn,qr->arn", Y, self.F)
         least = _ROUND * max(float(np.abs(torque).max()), _TINY)
-        if self.box:
-            size = np.sqrt(varied**2 + least**2)
-            return torque, size.sum(axis=1), np.einsum("arn,qr->aqn", varied / size, self.F)
-        size = np.sqrt(np.sum(varied**2, axis=1) + least**2)
-        slope = np.einsum("arn,qr->aqn", varied, self.F) / size[:, None]
-        return torque, SURE * size, SURE * slope
+        # of a box each part by itself, of a normal all of them together
+        squares = varied**2 if self.box else np.sum(varied**2, axis=1, keepdims=True)
+        size, far = np.sqrt(squares + least**2), 1.0 if self.box else SURE
+        slope = np.einsum("arn,qr->aqn", varied / size, self.F)
+        return torque, far * size.sum(axis=1), far * slope
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,16 +119,11 @@ class Objective:
         """Covariance (Q, Q) of the estimates.
 
         A direction that S leaves open is held at `UNKNOWN` sizes. S has no negative eigenvalue but
-        by rounding; what then comes out below zero is computed by eigenvalues.
+        by rounding.
         """
         size = np.outer(self.size, self.size)
-        scaled = S * size
-        held = scaled + np.eye(self.size.size) / UNKNOWN**2
-        C = np.linalg.inv(0.5 * (held + held.T))
-        if np.diag(C).min() <= 0:
-            values, axes = np.linalg.eigh(0.5 * (scaled + scaled.T))
-            C = (axes / (np.maximum(values, 0.0) + 1 / UNKNOWN**2)) @ axes.T
-        return C * size
+        values, axes = np.linalg.eigh(0.5 * (S + S.T) * size)
+        return (axes / (np.maximum(values, 0.0) + 1 / UNKNOWN**2)) @ axes.T * size
 
     def relative(self, S: FloatArray) -> FloatArray:
         """Relative bounds (Q,)."""

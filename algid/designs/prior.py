@@ -125,14 +125,12 @@ def of_case(case: Case, source: str, loaded: bool | None, knowns: PriorKnowledge
     x, y = case.place
     body = tuple(name for name, size in (("y_p", y), ("J_p", case.inertia)) if size)
     terms = (PHASES,) if arm.sines().any() or y else ()
-    model = Model(terms, gravity=arm.g)
-    shared = _shared(model, mass or None, loaded, source, knowns, body)
+    shared = _shared(Model(terms, gravity=arm.g), mass, loaded, source, knowns, body)
 
     def parameters(arm: Arm, mass: float) -> FloatArray:
         """Of the arm and a payload that is shaped like the case's."""
         inertia = case.inertia * (mass / case.payload if case.payload else 1.0)
-        value = dict(zip(CONSTANT_NAMES, arm.constants().tolist(), strict=True))
-        value |= dict(zip(SINES, arm.sines().tolist(), strict=True))
+        value = dict(zip((*CONSTANT_NAMES, *SINES), arm.phasors().tolist(), strict=True))
         l2 = arm.l2 if x is None else x
         value |= {"m_p": mass, "l1": arm.l1, "l2": l2, "y_p": y, "J_p": inertia}
         return vector(shared.names, value)

@@ -39,6 +39,8 @@ LONGEST_BLEND = 1.0  # s
 HIGHEST = 2.0  # Hz: beyond, arms shake and their drives lag
 MOST = 20  # harmonics a joint; a long motion leaves some out
 FEWEST = 5  # of a short one, whatever their frequency
+_RISE = np.polynomial.Polynomial([0, 0, 0, 0, 35, -84, 70, -20])
+"""From 0 to 1, with three derivatives that vanish at both ends."""
 
 
 @dataclass(frozen=True)
@@ -77,11 +79,8 @@ class Fourier:
         rise = min(BLEND * self.duration, LONGEST_BLEND)
         late = t > 0.5 * self.duration
         s = np.clip(np.where(late, self.duration - t, t) / rise, 0.0, 1.0)
-        sign = np.where(late, -1.0, 1.0)
-        value = s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)
-        slope = 140 * s**3 * (1 - s) ** 3 / rise
-        bend = 420 * s**2 * (1 - s) ** 2 * (1 - 2 * s) / rise**2
-        return np.stack([value, sign * slope, bend])
+        per_second = np.where(late, -1.0, 1.0) / rise
+        return np.stack([_RISE.deriv(order)(s) * per_second**order for order in range(3)])
 
     def motion(self, x: FloatArray, basis: FloatArray) -> Motion:
         """The motion of the numbers `x` at the times of the `basis`."""

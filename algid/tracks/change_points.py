@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from algid.arm import FloatArray
 from algid.base.compiled import chi2_exceeded, student_quantile
 from algid.tracks.cells import Cells
-from algid.tracks.drift import BLOCK, Drift, drift_of
+from algid.tracks.drift import BLOCK, Drift, drift_of, variances
 
 FIRST_SPANS = (1, 2, 3, 5, 8)  # cells: blocks of which few hold a change, before any is known
 SPANS = (1, 2, 3, 5, 8, 12, 18, 25, 35, 50)  # cells: 0.02 to 1 s
@@ -134,7 +134,7 @@ def excess(
         if known is not None:
             T, covariance = known
             J = np.diff(sums(T, starts, ends) / information[:, None], axis=0)
-            white += np.einsum("cx,xy,cy->c", J, covariance, J)
+            white += variances(J, covariance)
         squares = np.diff(score / information)[neighbours] ** 2 / white[neighbours]
         # neighbouring differences share a block: n of their squares scatter as n / 1.5 do
         freedom = squares.size / 1.5

@@ -154,9 +154,10 @@ def place(rows: Rows, low: float, high: float, variance: float) -> ChangeTime:
     variance = max(variance, (float(left @ left) - gain) / max(left.size - 3, 1))
     ratio = (gain - gains) / variance
 
-    def within(limit: float) -> tuple[float, float]:
-        likely = moments[ratio <= limit]
-        return float(likely[0]) - STEP, float(likely[-1]) + STEP
+    likely, safe = (
+        (float(moments[near][0]) - STEP, float(moments[near][-1]) + STEP)
+        for near in (ratio <= LIKELY, ratio <= SAFE)
+    )
 
     # Rows of a cluster may err alike, as where a joint turns back and friction is not of its
     # model's shape. Over the variance of the clusters' scores (Liang & Zeger 1986) a change has to
@@ -168,7 +169,7 @@ def place(rows: Rows, low: float, high: float, variance: float) -> ChangeTime:
     scores = np.add.reduceat(x * (left - score / alone * x), np.arange(0, left.size, every))
     alike = max(alone, float(scores @ scores))
     worth = score**2 * min(1 / alone, CLUSTERED / alike)
-    return ChangeTime(float(moments[best]), within(LIKELY), within(SAFE), worth)
+    return ChangeTime(float(moments[best]), likely, safe, worth)
 
 
 def explained(rows: Rows, moments: FloatArray) -> float:
@@ -209,16 +210,15 @@ def confirmed(
         They hold the masses about the group, and no other.
         """
         safe = [(-np.inf, ends[0]), *(one.safe for one in places), (ends[1], 0)]
-        times = [one.time for one in places]
-        own, spans = list(masses), []
+        times, spans = [one.time for one in places], []
         for first, last in groups:
-            start, end = safe[first][1], safe[last + 2][0]
-            spans.append((max(start, times[first] - WIDEST), min(end, times[last] + WIDEST)))
+            start = max(safe[first][1], times[first] - WIDEST)
+            spans.append((start, min(safe[last + 2][0], times[last] + WIDEST)))
         for at, piece in windows(source(), spans, arm.shift):
             first, last = groups[at]
             if len(piece) > 2 * POINTS:
-                moments = times[first : last + 1]
-                yield groups[at], rows_of(piece, arm, drift, moments, own[first : last + 2])
+                own = times[first : last + 1], masses[first : last + 2]
+                yield groups[at], rows_of(piece, arm, drift, *own)
 
     def within(rows: Rows, low: float, high: float) -> ChangeTime | None:
         """The change between `low` and `high` s; None where the rows have not both its sides.

@@ -61,7 +61,7 @@ class Drift:
     @property
     def variances(self) -> FloatArray:
         """Part of φ in the variances (K,) of the groups' masses, for unit variance."""
-        return np.einsum("kx,xy,ky->k", self.by_mass, self.covariance, self.by_mass)
+        return variances(self.by_mass, self.covariance)
 
     def variance_at(self, t: FloatArray, slope: FloatArray) -> FloatArray:
         """Variances (C,) at the times `t` (C,) of what changes by `slope` (C, f) with φ."""
@@ -119,6 +119,11 @@ def drift_of(cells: Cells, starts: NDArray[np.int64], variance: float) -> Drift:
     if not score @ phi > variance * chance:
         phi, inverse = 0 * phi, 0 * inverse
     return Drift(knots, phi.reshape(count, f), inverse, by_mass)
+
+
+def variances(J: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Variances (N,) of what has the derivatives J (N, p) by p parameters."""
+    return np.einsum("nx,xy,ny->n", J, covariance, J)
 
 
 def knots_of(cells: Cells) -> FloatArray:

@@ -165,8 +165,9 @@ def verdict(result: TrackResult) -> Verdict:
         own = [str(place) for place, one in enumerate(statuses, start=1) if one is status]
         if own:
             reasons.append(Notice("STRETCHES", numbers={"case": case, "numbers": own}))
+    share = max(100 * track.explained, 0.0)
     if track.explained < LEAST_R2:
-        numbers = {"case": "track", "percent": max(100 * track.explained, 0.0)}
+        numbers = {"case": "track", "percent": share}
         reasons.append(Notice("LITTLE_EXPLAINED", numbers=numbers))
     times = significant(float(track.colour) ** 0.5, 2)
     if track.colour > COLOURED:
@@ -180,7 +181,6 @@ def verdict(result: TrackResult) -> Verdict:
     if wrong_length(result.notices):
         failure = "a link length contradicts the arm's result"
     elif track.explained < WORST_R2:
-        share = max(100 * track.explained, 0)
         failure = f"arm and payload explain only {share:.0f} % of the torque: {asked}"
     elif track.colour > STRANGE and track.explained < ALL_BUT:
         failure = f"arm and payload miss the torque by {times} times its sensors' noise: {asked}"
@@ -229,9 +229,11 @@ def payload_figure(result: TrackResult) -> Panels:
     # in view: masses, their intervals and the truth; m_p(t) where it is as certain as usual, but
     # for jolts
     certain = track.std <= 3 * np.median(track.std)
-    reach = [*(end for one in stretches for end in one.ci95)]
-    reach.append(float(np.percentile(curve["low"][certain], 1)))
-    reach.append(float(np.percentile(curve["high"][certain], 99)))
+    reach = [
+        float(np.percentile(curve[end][certain], at)) for end, at in (("low", 1), ("high", 99))
+    ]
+    for one in stretches:
+        reach += one.ci95
     if result.schedule is not None:
         steps = [(time, mass) for time, mass in result.schedule if time < ends[-1]]
         times, true = zip((-np.inf, 0.0), *steps, strict=True)

@@ -43,7 +43,7 @@ from algid.tracks.change_points import (
     sums,
 )
 from algid.tracks.change_times import ChangeTime, confirmed, windows
-from algid.tracks.drift import Drift, drift_of
+from algid.tracks.drift import Drift, drift_of, variances
 from algid.tracks.result import Stretch, Track, TrackResult
 
 if TYPE_CHECKING:
@@ -172,52 +172,48 @@ def _weigh(
     covariance: FloatArray,
 ) -> Track:
     """The track of a log with payload changes at `changes`, each stretch from its `inner` cells."""
-    counts = list(map(len, inner))
-    places = np.append(0, np.cumsum(counts))
+    places = np.cumsum([0, *map(len, inner)])
     starts = places[:-1]
+    own = np.repeat(np.arange(len(inner)), np.diff(places))
     whole = joined(inner)
     drift = drift_of(whole, starts, rough_variance(whole))
     calm = drift.freed(whole)
     information = np.maximum(np.add.reduceat(calm.A, starts), 1e-300)
     weights = np.add.reduceat(calm.B, starts) / information
-    masses = np.repeat(weights, counts)
+    masses = weights[own]
     T = drift.followed(calm, starts, calm.sensitivity(arm, masses))
-    parts = list(pairwise(places.tolist()))
-    slow = excess(calm.A, calm.B, parts, known=(T, covariance), robust=False)
+    slow = excess(
+        calm.A, calm.B, list(pairwise(places.tolist())), known=(T, covariance), robust=False
+    )
     colour = max(rough_variance(calm), slow)
     squares = calm.less(masses[:, None] * np.eye(1, calm.b.shape[1])).E
-    own = np.add.reduceat(squares, starts) / (np.add.reduceat(calm.rows, starts) - 1)
-    noise = np.maximum(own, colour)  # a stretch's own, or the log's where that is larger
+    noise = np.add.reduceat(squares, starts) / (np.add.reduceat(calm.rows, starts) - 1)
+    noise = np.maximum(noise, colour)  # a stretch's own, or the log's where that is larger
     J = np.add.reduceat(T, starts) / information[:, None]
-    scatter = 1 / information + drift.variances
-    stds = np.sqrt(noise * scatter + np.einsum("kx,xy,ky->k", J, covariance, J))
+    stds = np.sqrt(noise * (1 / information + drift.variances) + variances(J, covariance))
     # m_p(t): each cell's mass comes from its neighbourhood within the stretch
     half, place = round(HALF_BAND / CELL), np.arange(len(calm))
-    low = np.maximum(place - half, np.repeat(places[:-1], counts))
-    high = np.minimum(place + half + 1, np.repeat(places[1:], counts))
+    low = np.maximum(place - half, starts[own])
+    high = np.minimum(place + half + 1, places[own + 1])
     A = np.maximum(sums(calm.A, low, high), 1e-300)
     by_constants = sums(T, low, high) / A[:, None]
     by_friction = sums(calm.M[:, 0, 1:], low, high) / A[:, None]
-    spread = np.repeat(noise, counts) * (1 / A + drift.variance_at(calm.middle, by_friction))
-    spread += np.einsum("cx,xy,cy->c", by_constants, covariance, by_constants)
+    spread = noise[own] * (1 / A + drift.variance_at(calm.middle, by_friction))
+    spread += variances(by_constants, covariance)
     signal, left = calm.Q.sum() - calm.rows.sum(), max(squares.sum() - calm.rows.sum(), 0.0)
-    share = float(1 - left / signal) if signal > 0 else 0.0
     wide = np.flatnonzero(cells.start[1:] - cells.end[:-1] > HOLE)
     times = [float(cells.start[0]), *(one.time for one in changes), float(cells.end[-1])]
-    brackets = [(one.time, *one.bracket) for one in changes]
-    stretches = []
-    for (start, end), mass, one in zip(pairwise(times), weights, stds, strict=True):
-        stretches.append(Stretch(start, end, float(mass), float(one)))
+    of_stretches = zip(times[:-1], times[1:], weights.tolist(), stds.tolist(), strict=True)
     return Track(
-        stretches=stretches,
+        stretches=list(starmap(Stretch, of_stretches)),
         t=calm.middle,
         m_p=sums(calm.B, low, high) / A,
         std=np.sqrt(spread),
-        stretch=np.repeat(np.arange(len(inner)), counts).astype(np.float64),
+        stretch=own.astype(np.float64),
         left=np.sqrt(np.maximum(squares, 0.0) / calm.rows),
-        changes=np.array(brackets).reshape(-1, 3),
+        changes=np.array([(one.time, *one.bracket) for one in changes]).reshape(-1, 3),
         colour=colour,
-        explained=share,
+        explained=float(1 - left / signal) if signal > 0 else 0.0,
         holes=np.stack([cells.end[wide], cells.start[wide + 1]], axis=1),
         tip_equivalent=arm.tip_equivalent,
     )
@@ -250,16 +246,13 @@ def _settled(source: Pass, arm: IdentifiedArm, rough: Sequence[Cells], drift: Dr
 
 def _inner_parts(cells: Cells, changes: Sequence[ChangeTime]) -> list[Cells]:
     """Cells of each stretch where its payload surely is constant, or some in its middle."""
-    times = [-np.inf, *(one.time for one in changes), np.inf]
-    firsts, lasts = [0], []
-    for one in changes:
-        firsts.append(int(np.searchsorted(cells.start, one.safe[1])) + CALM)
-        lasts.append(int(np.searchsorted(cells.end, one.safe[0], side="right")) - CALM)
-    parts = []
-    for ends, first, last in zip(pairwise(times), firsts, [*lasts, len(cells)], strict=True):
-        if last - first < FEWEST:
-            own = np.searchsorted(cells.start, ends)
-            first = min(max(int(own.sum() - FEWEST) // 2, 0), len(cells) - FEWEST)
-            last = first + FEWEST
-        parts.append(cells.part(first, last))
-    return parts
+    count = len(cells)
+    times, safe = [one.time for one in changes], np.array([one.safe for one in changes])
+    before, behind = safe.reshape(-1, 2).T
+    firsts = np.append(0, np.searchsorted(cells.start, behind) + CALM)
+    lasts = np.append(np.searchsorted(cells.end, before, side="right") - CALM, count)
+    ends = np.array([0, *np.searchsorted(cells.start, times), count])
+    amid = np.clip((ends[1:] + ends[:-1] - FEWEST) // 2, 0, count - FEWEST)
+    few = lasts - firsts < FEWEST
+    firsts, lasts = np.where(few, amid, firsts), np.where(few, amid + FEWEST, lasts)
+    return list(map(cells.part, firsts.tolist(), lasts.tolist()))
