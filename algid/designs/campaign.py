@@ -101,8 +101,8 @@ class Campaign:
         return Sensitivities(self.experiment.shared.model, motion, rate)
 
     def random(self, rng: np.random.Generator) -> FloatArray:
-        """A random motion about the resting posture."""
-        return self.family.random(rng, self.rest[:2])
+        """A random motion about the resting posture, of equal mean velocity in each harmonic."""
+        return np.append(self.rest[:2], rng.standard_normal(self.rest.size - 2))
 
     def evaluate(self, x: FloatArray, stage: Stage) -> Evaluation:
         """Figure and limits of a motion."""

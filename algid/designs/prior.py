@@ -190,9 +190,8 @@ def _of_result(
     for name, one in result.estimates.items():
         if one.estimate is not None:
             value[name] = one.estimate
-    exact = set[str]()
+    exact = () if knowns.payload is None else ("m_p",)
     if knowns.payload is not None:
-        exact.add("m_p")
         if "J_p" in value:
             value["J_p"] *= knowns.payload / (value.get("m_p") or knowns.payload)
         value["m_p"] = knowns.payload

@@ -95,10 +95,6 @@ class Fourier:
         centre = per_order[..., 0, :, :].sum(axis=-1)
         return np.concatenate([centre, coefficients.reshape(*centre.shape[:-1], -1)], axis=-1)
 
-    def random(self, rng: np.random.Generator, centre: FloatArray) -> FloatArray:
-        """A random motion about a posture (2,), with equal mean velocity in each harmonic."""
-        return np.concatenate([centre, rng.standard_normal(self.size - 2)])
-
 
 def middles(duration: float, rate: float) -> FloatArray:
     """Middles (N,) in s of the samples of a motion at about `rate` Hz."""

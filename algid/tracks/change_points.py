@@ -18,7 +18,7 @@ there is one; `algid.tracks.change_times` has the rows around it say whether the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +59,11 @@ def first_segmentation(cells: Cells) -> tuple[list[int], Drift, float]:
     places = [0, len(cells)]
     spans: Sequence[int] = FIRST_SPANS
     for _ in range(MOST_ROUNDS):
-        calm = calm_parts(places)
+        # from which cell to which each stretch lies away from the changes at its ends
+        calm = np.stack([places[:-1], places[1:]], axis=1)
+        calm[1:, 0] += BEHIND
+        calm[:-1, 1] -= AHEAD
+        calm = np.maximum.accumulate(calm, axis=1)
         # masses are free in short blocks, lest a change that is not found passes for friction
         blocks = np.union1d(np.arange(0, len(cells), BLOCK), np.ravel(calm)[:-1])
         drift = drift_of(cells, blocks, rough_variance(cells))
@@ -76,14 +80,6 @@ def first_segmentation(cells: Cells) -> tuple[list[int], Drift, float]:
     return places, drift, spread
 
 
-def calm_parts(places: Sequence[int]) -> list[tuple[int, int]]:
-    """From which cell to which each stretch lies away from the changes at its ends."""
-    begins, ends = np.array(places[:-1]), np.array(places[1:])
-    begins[1:] += BEHIND
-    ends[:-1] -= AHEAD
-    return list(zip(begins.tolist(), np.maximum(begins, ends).tolist(), strict=True))
-
-
 def rough_variance(cells: Cells) -> float:
     """Variance of the rows about masses that hold for a few cells, one at least."""
     groups = len(cells) // SHORTEST
@@ -96,7 +92,7 @@ def rough_variance(cells: Cells) -> float:
 def excess(
     A: FloatArray,
     B: FloatArray,
-    parts: Sequence[tuple[int, int]],
+    parts: Collection[Sequence[int]],
     spans: Sequence[int] = SPANS,
     known: tuple[FloatArray, FloatArray] | None = None,
     *,

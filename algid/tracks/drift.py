@@ -94,7 +94,9 @@ def drift_of(cells: Cells, starts: NDArray[np.int64], variance: float) -> Drift:
     Drift
         Nothing where friction explains no more than chance does.
     """
-    knots, M, t = knots_of(cells), cells.M, cells.middle
+    first, last = float(cells.start[0]), float(cells.end[-1])
+    spaces = min(MOST_KNOTS, max(1, round((last - first) / SPACING)))
+    knots, M, t = np.linspace(first, last, spaces + 1), cells.M, cells.middle
     count, f = knots.size, M.shape[1] - 1
     A = np.maximum(np.add.reduceat(cells.A, starts), 1e-300)
     G, N = np.zeros((starts.size, count, f)), np.zeros((count, count, f, f))
@@ -124,12 +126,6 @@ def drift_of(cells: Cells, starts: NDArray[np.int64], variance: float) -> Drift:
 def variances(J: FloatArray, covariance: FloatArray) -> FloatArray:
     """Variances (N,) of what has the derivatives J (N, p) by p parameters."""
     return np.einsum("nx,xy,ny->n", J, covariance, J)
-
-
-def knots_of(cells: Cells) -> FloatArray:
-    """Times (H,) in s of the knots over a log."""
-    start, end = float(cells.start[0]), float(cells.end[-1])
-    return np.linspace(start, end, 1 + min(MOST_KNOTS, max(1, round((end - start) / SPACING))))
 
 
 def between(knots: FloatArray, values: FloatArray, t: FloatArray) -> FloatArray:

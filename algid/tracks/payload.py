@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid import __version__
 from algid.arm import FloatArray
@@ -143,7 +144,7 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
     cells = joined(parts)
     places, drift, spread = first_segmentation(cells)
     for _ in range(ROUNDS):
-        cells = joined(_settled(source, arm, _cut(cells, places), drift))
+        cells, _ = _settled(source, arm, _cut(cells, places), drift)
         places, drift, spread = first_segmentation(cells)
     # those that cells show, as far as their rows confirm them
     shown = []
@@ -155,8 +156,8 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
     ends = float(cells.start[0]), float(cells.end[-1])
     changes = confirmed(source, arm, drift, ends, spread, shown, masses)
     # whitening remembers: what a stretch is weighed by starts behind the jolt at its beginning
-    settled = _settled(source, arm, _inner_parts(cells, changes), drift)
-    return _weigh(cells, changes, settled, arm, covariance)
+    inner, stretch = _settled(source, arm, _inner_parts(cells, changes), drift)
+    return _weigh(cells, changes, inner, stretch, arm, covariance)
 
 
 def _cut(cells: Cells, places: Sequence[int]) -> list[Cells]:
@@ -167,24 +168,25 @@ def _cut(cells: Cells, places: Sequence[int]) -> list[Cells]:
 def _weigh(
     cells: Cells,
     changes: Sequence[ChangeTime],
-    inner: Sequence[Cells],
+    inner: Cells,
+    own: NDArray[np.int64],
     arm: IdentifiedArm,
     covariance: FloatArray,
 ) -> Track:
-    """The track of a log with payload changes at `changes`, each stretch from its `inner` cells."""
-    places = np.cumsum([0, *map(len, inner)])
+    """The track of a log with payload changes at `changes`, each stretch from its `inner` cells.
+
+    `own` is the number (C,) of each inner cell's stretch.
+    """
+    places = np.searchsorted(own, np.arange(len(changes) + 2))
     starts = places[:-1]
-    own = np.repeat(np.arange(len(inner)), np.diff(places))
-    whole = joined(inner)
-    drift = drift_of(whole, starts, rough_variance(whole))
-    calm = drift.freed(whole)
+    drift = drift_of(inner, starts, rough_variance(inner))
+    calm = drift.freed(inner)
     information = np.maximum(np.add.reduceat(calm.A, starts), 1e-300)
     weights = np.add.reduceat(calm.B, starts) / information
     masses = weights[own]
     T = drift.followed(calm, starts, calm.sensitivity(arm, masses))
-    slow = excess(
-        calm.A, calm.B, list(pairwise(places.tolist())), known=(T, covariance), robust=False
-    )
+    parts = np.stack([starts, places[1:]], axis=1)
+    slow = excess(calm.A, calm.B, parts, known=(T, covariance), robust=False)
     colour = max(rough_variance(calm), slow)
     squares = calm.less(masses[:, None] * np.eye(1, calm.b.shape[1])).E
     noise = np.add.reduceat(squares, starts) / (np.add.reduceat(calm.rows, starts) - 1)
@@ -219,15 +221,20 @@ def _weigh(
     )
 
 
-def _settled(source: Pass, arm: IdentifiedArm, rough: Sequence[Cells], drift: Drift) -> list[Cells]:
-    """Each stretch's cells, linearised again at its own mass and friction, in one pass."""
-    parts, about, spans, counts = list[Cells](), [], [], [0]
-    for cells in rough:
+def _settled(
+    source: Pass, arm: IdentifiedArm, rough: Sequence[Cells], drift: Drift
+) -> tuple[Cells, NDArray[np.int64]]:
+    """All stretches' cells, linearised again at their own mass and friction, in one pass.
+
+    The second is the number (C,) of each cell's stretch.
+    """
+    parts, about, spans, numbers = list[Cells](), [], [], []
+    for number, cells in enumerate(rough):
         # in parts so short that friction hardly changes in them, and that memory holds them
         lasting = LASTING if drift.phi.any() else LONGEST
-        counts.append(max(1, round(len(cells) * CELL / lasting)))
+        count = max(1, round(len(cells) * CELL / lasting))
         mass = drift.freed(cells).mass
-        for part in _cut(cells, np.linspace(0, len(cells), counts[-1] + 1).astype(int).tolist()):
+        for part in _cut(cells, np.linspace(0, len(cells), count + 1).astype(int).tolist()):
             # The angles' noise passes through the torque's partial derivatives, friction's among
             # them: where these are of another friction, rows have not the noise that is reckoned
             # with, and masses err.
@@ -236,12 +243,12 @@ def _settled(source: Pass, arm: IdentifiedArm, rough: Sequence[Cells], drift: Dr
             parts.append(part)
             about.append(c)
             spans.append((float(part.start[0]), float(part.end[-1])))
+            numbers.append(number)
     settled = [list[Cells]() for _ in parts]
     for at, piece in windows(source(), spans, arm.shift):
         settled[at] += cells_of([piece], arm, about[at])
     whole = [joined(own or [part]) for own, part in zip(settled, parts, strict=True)]
-    ends = np.cumsum(counts).tolist()
-    return [joined(whole[first:last]) for first, last in pairwise(ends)]
+    return joined(whole), np.repeat(numbers, list(map(len, whole)))
 
 
 def _inner_parts(cells: Cells, changes: Sequence[ChangeTime]) -> list[Cells]:
