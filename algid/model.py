@@ -16,20 +16,26 @@ business; here they are put in order once a model (`Compiled`) and evaluated alo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from algid.arm import FloatArray
 from algid.base.names import by_name, names_in, outside, within
-from algid.physics.expressions import Expression, Product, Values
-from algid.physics.motion import Motion, Widths, sine_cosine
 from algid.physics.parameters import BODY, PAYLOAD, Parameter
-from algid.physics.signals import ACCELERATIONS, rate
+from algid.physics.signals import (
+    ALPHA,
+    MOTION,
+    Motion,
+    Product,
+    Values,
+    Widths,
+    sine_cosine,
+)
 from algid.physics.terms import ALWAYS, OPTIONAL, Term
-from algid.physics.terms.base import TorqueColumn
+from algid.physics.terms.base import TorqueColumn, Vector
 from algid.physics.terms.coulomb import F1, F2
 from algid.physics.terms.rigid import K1, K2, K3, K4, K5
 from algid.physics.terms.rotor import J2
@@ -86,22 +92,18 @@ MOMENTS = (K1, K2, K4)
 """The constants k1, k2 and k4, which are phasors with their sine parts: K = k + i ks."""
 LARGEST_PHASE = np.pi / 4
 """rad: beyond, a phase is another convention."""
-_JOINT_PAIRS = ((0, 0), (0, 1), (1, 0), (1, 1))
-"""A torque's joint and an angle's joint."""
 _SIGN_TRIALS = 4  # as many patterns as the signs of two loads have
 
 
 @dataclass(frozen=True)
-class Model:
-    """Which terms the torque has beside eq. (1).
+class Model(Widths):
+    """Which terms the torque has beside eq. (1), and the widths of its friction.
 
     Parameters
     ----------
     terms : names in `TERMS`, in any order
     gravity : float, m/s^2
         0 for an arm that moves in a horizontal plane: parameters that weigh have no column then.
-    coulomb_speed, stribeck_speed : float, rad/s
-        Widths of friction: see `algid.physics.motion.Widths`.
     by_torque : bool
         Whether friction by load is in proportion to all other torque of the joint, and not to its
         inertia and weight alone. Only the robust estimate is compared under both.
@@ -114,8 +116,6 @@ class Model:
 
     terms: tuple[str, ...] = ()
     gravity: float = 9.81
-    coulomb_speed: float = 0.2
-    stribeck_speed: float = 0.3
     by_torque: bool = False
 
     def __post_init__(self) -> None:
@@ -123,11 +123,6 @@ class Model:
         if unknown:
             raise ValueError(f"terms: expected some of {', '.join(TERMS)}, got {unknown[0]!r}")
         object.__setattr__(self, "terms", within(TERMS, self.terms))
-
-    @property
-    def shape(self) -> Widths:
-        """The widths of friction."""
-        return Widths(self.coulomb_speed, self.stribeck_speed)
 
     @property
     def compiled(self) -> Compiled:
@@ -176,12 +171,8 @@ def without_delay(terms: Iterable[str]) -> tuple[str, ...]:
     return within(terms, TERMS)
 
 
-Weighted = Mapping[Product, tuple[tuple[int, float], ...]]
+Weighted = Mapping[Product, Sequence[tuple[int, float]]]
 """An expression that is linear in the coefficients: for each product their places and factors."""
-
-
-Entry = tuple[int, int, Expression]
-"""A joint, the place of a column, and what that column adds to the joint's torque."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,117 +196,73 @@ class Compiled:
         return dict(zip(self.names, range(len(self.names)), strict=True))
 
     @cached_property
-    def s(self) -> tuple[Entry, ...]:
-        """Entries of s in τ = d²s/dt² + dp/dt + f."""
-        return self._entries(lambda column, joint: column.s[joint])
+    def parts(self) -> tuple[tuple[Weighted, Weighted], ...]:
+        """f, p and s in τ = d²s/dt² + dp/dt + f, by joint."""
+        return (
+            self._weighted(column.f for column in self.columns),
+            self._weighted(column.p for column in self.columns),
+            self._weighted(column.s for column in self.columns),
+        )
 
     @cached_property
-    def p(self) -> tuple[Entry, ...]:
-        """Entries of p in τ = d²s/dt² + dp/dt + f."""
-        return self._entries(lambda column, joint: column.p[joint])
+    def torque(self) -> tuple[Weighted, Weighted]:
+        """The torque, by joint."""
+        return self._weighted(column.torque for column in self.columns)
 
     @cached_property
-    def f(self) -> tuple[Entry, ...]:
-        """Entries of f in τ = d²s/dt² + dp/dt + f."""
-        return self._entries(lambda column, joint: column.f[joint])
-
-    @cached_property
-    def products(self) -> tuple[list[Product], ...]:
-        """The products in f, p and s, each once and in order, without the one of no signal."""
-        by_part = []
-        for entries in (self.f, self.p, self.s):
-            products: dict[Product, None] = {}
-            for _, _, entry in entries:
-                products |= dict.fromkeys(entry.products)
-            products.pop((), None)
-            by_part.append(list(products))
-        return tuple(by_part)
-
-    @cached_property
-    def regressor(self) -> tuple[Entry, ...]:
-        """Entries of Y."""
-        return self._entries(_whole)
+    def rest(self) -> Sequence[Weighted]:
+        """The torque without accelerations, by joint."""
+        rest = []
+        for whole in self.torque:
+            rest.append({one: whole[one] for one in whole if set(one).isdisjoint(ALPHA)})
+        return rest
 
     @cached_property
     def partials(self) -> Mapping[tuple[int, int, int], Weighted]:
         """Derivatives by order of θ's derivative, torque's joint and angle's joint."""
         partials = {}
-        for order, signal in enumerate(("theta", "omega", "alpha")):
-            for row, angle in _JOINT_PAIRS:
-                partials[order, row, angle] = self._derivative(f"{signal}{angle + 1}", row)
+        for order, signals in enumerate(MOTION):
+            for angle, signal in enumerate(signals):
+                by_joint = self._weighted([column.partials[signal] for column in self.columns])
+                for joint, weighted in enumerate(by_joint):
+                    partials[order, joint, angle] = weighted
         return partials
 
     @cached_property
-    def inertia(self) -> Mapping[tuple[int, int], Weighted]:
-        """What multiplies the accelerations, by torque's joint and angle's joint."""
-        inertia = {}
-        for row, angle in _JOINT_PAIRS:
-            inertia[row, angle] = self._derivative(f"alpha{angle + 1}", row)
-        return inertia
+    def inertia(self) -> Sequence[Weighted]:
+        """What multiplies the accelerations: both of the first joint's torque, then the other's."""
+        return [self.partials[2, joint, angle] for joint, angle in np.ndindex(2, 2)]
 
-    @cached_property
-    def rest(self) -> tuple[Weighted, Weighted]:
-        """The torque without accelerations, by joint."""
-        return self._weighted(_at_rest, 0), self._weighted(_at_rest, 1)
+    def _weighted(self, vectors: Iterable[Vector]) -> tuple[Weighted, Weighted]:
+        """What the columns are, or derive to, as expressions in all of their coefficients."""
+        one: dict[Product, list[tuple[int, float]]] = {}
+        two: dict[Product, list[tuple[int, float]]] = {}
+        for column, vector in zip(self.columns, vectors, strict=True):
+            for weighted, entry in zip((one, two), vector, strict=True):
+                for product, factor in entry.products.items():
+                    pair = self.place[column.parameter], factor
+                    weighted.setdefault(product, []).append(pair)
+        return one, two
 
-    def _entries(self, of: Callable[[TorqueColumn, int], Expression]) -> tuple[Entry, ...]:
-        entries = []
-        for column in self.columns:
-            for joint in range(2):
-                entry = of(column, joint)
-                if entry:
-                    entries.append((joint, self.place[column.parameter], entry))
-        return tuple(entries)
+    def only(self, places: Collection[int]) -> Compiled:
+        """The columns at `places` alone, each where it stands."""
+        return _only(self, frozenset(places))
 
-    def _derivative(self, signal: str, joint: int) -> Weighted:
-        return self._weighted(lambda column, row: _slope(column, row, signal), joint)
+    @property
+    def of_load(self) -> Compiled:
+        """The columns that are the joints' load."""
+        return self.only(self.loads)
 
-    def _weighted(self, of: Callable[[TorqueColumn, int], Expression], joint: int) -> Weighted:
-        weighted: dict[Product, list[tuple[int, float]]] = {}
-        for column in self.columns:
-            for product, factor in of(column, joint).products.items():
-                weighted.setdefault(product, []).append((self.place[column.parameter], factor))
-        return {product: tuple(pairs) for product, pairs in weighted.items()}
-
-    def only(self, weighted: Weighted, places: Iterable[int]) -> Weighted:
-        """What the columns at `places` give of it."""
-        wanted = set(places)
-        kept = {}
-        for product, pairs in weighted.items():
-            own = tuple(pair for pair in pairs if pair[0] in wanted)
-            if own:
-                kept[product] = own
-        return kept
-
-    @cached_property
-    def of_load(self) -> tuple[tuple[Weighted, ...], tuple[Weighted, ...]]:
-        """Entries of `inertia` and joints of `rest`, of the columns that are the joints' load."""
-        return self._parts(self.loads)
-
-    @cached_property
-    def beside_load(self) -> tuple[tuple[Weighted, ...], tuple[Weighted, ...]]:
-        """The same of the other columns."""
-        return self._parts(set(range(len(self.names))).difference(self.loads))
-
-    def _parts(self, places: Collection[int]) -> tuple[tuple[Weighted, ...], tuple[Weighted, ...]]:
-        inertia = tuple(self.only(weighted, places) for weighted in self.inertia.values())
-        return inertia, tuple(self.only(weighted, places) for weighted in self.rest)
+    @property
+    def beside_load(self) -> Compiled:
+        """The other columns."""
+        return self.only(set(range(len(self.names))).difference(self.loads))
 
 
-@cache
-def _whole(column: TorqueColumn, joint: int) -> Expression:
-    """What a column adds to a joint's torque."""
-    return rate(rate(column.s[joint])) + rate(column.p[joint]) + column.f[joint]
-
-
-@cache
-def _slope(column: TorqueColumn, joint: int, signal: str) -> Expression:
-    return _whole(column, joint).by(signal)
-
-
-@cache
-def _at_rest(column: TorqueColumn, joint: int) -> Expression:
-    return _whole(column, joint).without(ACCELERATIONS)
+@lru_cache(maxsize=1024)
+def _only(compiled: Compiled, places: frozenset[int]) -> Compiled:
+    own = [one for one in compiled.columns if compiled.place[one.parameter] in places]
+    return replace(compiled, columns=tuple(own))
 
 
 def terms_named(names: Iterable[str]) -> Iterator[Term]:
@@ -386,22 +333,26 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
         )
     if c is None:
         c = np.zeros(len(model.names))
-    compiled = model.compiled
-    values = of_links = Values(motion, model.shape)
+    compiled, own = model.compiled, inertial(model)
+    values = of_links = Values(motion, model)
     links = link_motion(model, c, motion)
     if links is not motion:
-        of_links = Values(links, model.shape)
-    own = inertial(model)
+        of_links = Values(links, model)
     Y = np.zeros((2, len(compiled.names), motion.theta.shape[1]))
-    for joint, place, entry in compiled.regressor:
-        (of_links if place in own else values).into(Y[joint, place], entry)
-    for share, whole in of_motors(model):
+    for rows, weighted in zip(Y, compiled.torque, strict=True):
+        for product, pairs in weighted.items():
+            for place, factor in pairs:
+                value = (of_links if place in own else values).of(product)
+                rows[place] += value if factor == 1 else factor * value
+    for share, whole in acting(model, "of_motor"):
         Y[:, share] = c[whole] * (Y[:, share] - Y[:, whole])
-    for name, joint in attributes(model, "by_load"):
+    for place, joint in acting(model, "by_load"):
         loads = list(compiled.loads)
         load = _torques(Y[joint, loads], apart(model, c)[loads])
-        Y[joint, compiled.place[name]] = np.abs(load) * smooth_sign(model, motion.omega[joint])
-    return _amplified(model, c, Y)
+        Y[joint, place] = np.abs(load) * smooth_sign(model, motion.omega[joint])
+    if acting(model, "gains"):
+        Y *= gains(model, c).reshape(2, 1, -1)
+    return Y
 
 
 def loads_of(model: Model) -> tuple[str, ...]:
@@ -414,18 +365,9 @@ def inertial(model: Model) -> tuple[int, ...]:
     return _compiled(model.terms, model.gravity != 0, by_torque=False).loads
 
 
-def of_motors(model: Model) -> list[tuple[int, int]]:
-    """Places of the motors' shares, and of what they are shares of."""
-    place = model.compiled.place
-    pairs = []
-    for term in model.terms:
-        pairs += [(place[share], place[whole]) for share, whole in TERMS[term].of_motor]
-    return pairs
-
-
 def apart(model: Model, c: FloatArray) -> FloatArray:
     """Coefficients (q, ...) whose links are without their motors, and these in place of shares."""
-    pairs = of_motors(model)
+    pairs = acting(model, "of_motor")
     if pairs:
         c = np.array(c)
     for share, whole in pairs:
@@ -436,12 +378,12 @@ def apart(model: Model, c: FloatArray) -> FloatArray:
 
 def link_motion(model: Model, c: FloatArray, motion: Motion) -> Motion:
     """The links' motion where the joints are elastic and `motion`, the motors', has a load."""
-    pairs = attributes(model, "elastic")
+    pairs = acting(model, "elastic")
     if not pairs or motion.load is None:
         return motion
     signals = np.stack([motion.theta, motion.omega, motion.alpha])
-    for name, joint in pairs:
-        signals[:, joint] -= c[model.compiled.place[name]] * motion.load[:, joint]
+    for place, joint in pairs:
+        signals[:, joint] -= c[place] * motion.load[:, joint]
     return Motion(*signals)
 
 
@@ -476,28 +418,25 @@ def length_by_coupling(values: Mapping[str, float], gravity: float) -> float | N
     return gravity * abs(first) / abs(second) * sign
 
 
-def attributes(model: Model, kind: str) -> list[tuple[str, int]]:
-    """Pairs of a parameter of the model's columns and the joint on which it acts as `kind`."""
-    pairs: list[tuple[str, int]] = []
+def acting(model: Model, kind: str) -> list[tuple[int, int]]:
+    """Places of the model's coefficients that act as `kind`, an attribute of `Term`, and on what.
+
+    That is a joint, or the place of the coefficient whose share each is.
+    """
+    place, pairs = model.compiled.place, []
     for term in model.terms:
-        pairs += getattr(TERMS[term], kind)
-    return [pair for pair in pairs if pair[0] in model.compiled.place]
+        for name, on in getattr(TERMS[term], kind):
+            if name in place:
+                pairs.append((place[name], place.get(on, on)))
+    return pairs
 
 
 def gains(model: Model, c: FloatArray) -> FloatArray:
     """By what (2, ...) each joint's torque is multiplied at the coefficients `c` (q, ...)."""
     factor = np.ones((2, *c.shape[1:]))
-    for name, joint in attributes(model, "gains"):
-        factor[joint] *= 1 + c[model.compiled.place[name]]
+    for place, joint in acting(model, "gains"):
+        factor[joint] *= 1 + c[place]
     return factor
-
-
-def _amplified(model: Model, c: FloatArray, rows: FloatArray) -> FloatArray:
-    """`rows` (2, ...), in place, times each joint's gain."""
-    for joint, factor in enumerate(gains(model, c)):
-        if np.any(factor != 1):
-            rows[joint] *= factor
-    return rows
 
 
 def _torques(rows: FloatArray, c: FloatArray) -> FloatArray:
@@ -515,12 +454,11 @@ def load(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
 
     It is what friction by load goes by, less that friction, and as no gain reads it.
     """
-    values, c = Values(motion, model.shape), apart(model, c)
-    inertia, rest = model.compiled.of_load
-    m11, m12, m21, m22 = (summed(weighted, c, values) for weighted in inertia)
-    alpha1, alpha2 = motion.alpha
-    first = m11 * alpha1 + m12 * alpha2 + summed(rest[0], c, values)
-    return np.stack([first, m21 * alpha1 + m22 * alpha2 + summed(rest[1], c, values)])
+    values, c = Values(motion, model), apart(model, c)
+    load = np.empty_like(motion.theta)
+    for joint, weighted in enumerate(model.compiled.of_load.torque):
+        load[joint] = summed(weighted, c, values)
+    return load
 
 
 def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
@@ -548,18 +486,18 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     J = regressor(model, motion, c)
     if model.linear:
         return J
-    place, loads = model.compiled.place, list(model.compiled.loads)
-    for share, whole in of_motors(model):
+    loads = list(model.compiled.loads)
+    for share, whole in acting(model, "of_motor"):
         if c[whole]:  # of nothing no motor has a share
             J[:, whole] += c[share] / c[whole] * J[:, share]
     factor = gains(model, c)
-    for name, joint in attributes(model, "gains"):
-        J[joint, place[name]] = _torques(J[joint], c) / factor[joint]
-    for name, joint in attributes(model, "by_load"):
+    for place, joint in acting(model, "gains"):
+        J[joint, place] = _torques(J[joint], c) / factor[joint]
+    for place, joint in acting(model, "by_load"):
         # a gain scales the load, which leaves its sign
         load = _torques(J[joint, loads], apart(model, c)[loads])
         sign = smooth_sign(model, motion.omega[joint])
-        J[joint, loads] *= 1 + c[place[name]] * sign * np.sign(load)
+        J[joint, loads] *= 1 + c[place] * sign * np.sign(load)
     return J
 
 
@@ -579,23 +517,19 @@ def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
         sign is too.
     """
     compiled, own = model.compiled, apart(model, c)
-    values = Values(motion, model.shape)
+    values = Values(motion, model)
     P = np.empty((3, 2, 2, motion.theta.shape[1]))
     for where, weighted in compiled.partials.items():
         P[where] = summed(weighted, own, values)
-    for name, joint in attributes(model, "by_load"):
-        share, sign = own[compiled.place[name]], smooth_sign(model, motion.omega[joint])
+    for place, joint in acting(model, "by_load"):
+        share, sign = own[place], smooth_sign(model, motion.omega[joint])
         carried = load(model, c, motion)[joint]
-        for order in range(3):
-            for angle in range(2):
-                of_load = compiled.only(compiled.partials[order, joint, angle], compiled.loads)
-                slope = summed(of_load, own, values)
+        for (order, row, angle), weighted in compiled.of_load.partials.items():
+            if row == joint:
+                slope = summed(weighted, own, values)
                 P[order, joint, angle] += share * sign * np.sign(carried) * slope
         P[1, joint, joint] += share * np.abs(carried) * (1 - sign**2) / model.coulomb_speed
-    factor = gains(model, own)
-    for joint in range(2):
-        if np.any(factor[joint] != 1):
-            P[:, joint] *= factor[joint]
+    P *= gains(model, own).reshape(2, 1, -1)
     return P
 
 
@@ -609,9 +543,9 @@ def inertia(model: Model, c: FloatArray, theta: FloatArray) -> FloatArray:
 
     `c` is (q,), or (q, ...) for arms of their own at each sample.
     """
-    values, c = Values(Motion(theta, theta, theta), model.shape), apart(model, c)
+    values, c = Values(Motion(theta, theta, theta), model), apart(model, c)
     M = np.empty((2, 2) + theta.shape[1:])
-    for entry, weighted in model.compiled.inertia.items():
+    for entry, weighted in zip(np.ndindex(2, 2), model.compiled.inertia, strict=True):
         M[entry] = summed(weighted, c, values)
     return M
 
@@ -640,34 +574,27 @@ def acceleration(
 
     The signs of L are those of the torque left for it, and found again until they are their own.
     """
-    compiled, c = model.compiled, apart(model, c)
-    by_load = attributes(model, "by_load")
-    values = Values(Motion(theta, omega, omega), model.shape)
-    left = np.array(tau, dtype=np.float64)
-    for joint, factor in enumerate(gains(model, c)):
-        if factor != 1:
-            left[joint] /= factor
+    c, by_load = apart(model, c), acting(model, "by_load")
+    values = Values(Motion(theta, omega, omega), model)
+    beside = model.compiled.beside_load if by_load else model.compiled
+    R = [summed(weighted, c, values) for weighted in beside.inertia]
+    left = tau / gains(model, c).reshape(2, -1)
+    for joint, weighted in enumerate(beside.rest):
+        left[joint] -= summed(weighted, c, values)
     if not by_load:
-        for joint in range(2):
-            left[joint] -= summed(compiled.rest[joint], c, values)
-        return _solved([summed(one, c, values) for one in compiled.inertia.values()], left)
-    inertia_of_load, rest_of_load = compiled.of_load
-    inertia_beside, rest_beside = compiled.beside_load
-    M = [summed(weighted, c, values) for weighted in inertia_of_load]
-    R = [summed(weighted, c, values) for weighted in inertia_beside]
-    n = np.zeros_like(left)
-    for joint in range(2):
-        left[joint] -= summed(rest_beside[joint], c, values)
-        n[joint] = summed(rest_of_load[joint], c, values)
-    share = np.zeros_like(left)
-    for name, joint in by_load:
-        share[joint] = c[compiled.place[name]] * smooth_sign(model, omega[joint])
+        return _solved(R, left)
+    of_load = model.compiled.of_load
+    M = [summed(weighted, c, values) for weighted in of_load.inertia]
+    n, share = np.zeros_like(left), np.zeros_like(left)
+    for joint, weighted in enumerate(of_load.rest):
+        n[joint] = summed(weighted, c, values)
+    for place, joint in by_load:
+        share[joint] = c[place] * smooth_sign(model, omega[joint])
     signs = np.sign(left)
     for _ in range(_SIGN_TRIALS):
         D = 1 + share * signs
-        first_row = [D[0] * M[0] + R[0], D[0] * M[1] + R[1]]
-        second_row = [D[1] * M[2] + R[2], D[1] * M[3] + R[3]]
-        alpha = _solved(first_row + second_row, left - D * n)
+        rows = [D[joint] * m + r for joint, m, r in zip((0, 0, 1, 1), M, R, strict=True)]
+        alpha = _solved(rows, left - D * n)
         load = np.stack([M[0] * alpha[0] + M[1] * alpha[1], M[2] * alpha[0] + M[3] * alpha[1]]) + n
         after = np.sign(load)
         if np.array_equal(after, signs):

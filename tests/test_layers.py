@@ -89,7 +89,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy polars pydantic pydantic_core scipy",
     ),
     "exports": room(
-        "arm errors estimators identification model names notices options "
+        "arm errors estimators identification model names notices options physics "
         "results",
         "jinja2 numpy polars scipy",
     ),

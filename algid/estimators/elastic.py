@@ -21,18 +21,17 @@ from algid.estimators.combine import Prior, joined
 from algid.model import (
     Model,
     Motion,
+    acting,
     apart,
-    attributes,
     gains,
     inertia,
     inertial,
     link_motion,
     load,
-    of_motors,
     summed,
     torque,
 )
-from algid.physics.expressions import Values
+from algid.physics.signals import Values
 
 _ROTOR = 0.5  # a motor's share of the inertia that its joint feels, before any log
 _ROUNDS = 6
@@ -43,7 +42,7 @@ _REACH = 0.125  # s, of a window to either side
 
 def with_rotors(known: Prior | None, model: Model) -> Prior | None:
     """What is known, and that a motor's share of an inertia is some half at most."""
-    shares = tuple(model.names[share] for share, _ in of_motors(model))
+    shares = tuple(model.names[share] for share, _ in acting(model, "of_motor"))
     if not shares or (known is not None and not set(shares).isdisjoint(known.names)):
         return known
     size = len(shares)
@@ -64,14 +63,14 @@ def flexed(
         Torques that acted: what of them is no friction and moves no motor passes the joints. None
         takes the load of the links' own motion, by repeated substitution.
     """
-    if not attributes(model, "elastic"):
+    if not acting(model, "elastic"):
         return motion
     reach = 0.5 * _REACH
     if tau is None:
         soft = 0.0
-        for name, joint in attributes(model, "elastic"):
+        for place, joint in acting(model, "elastic"):
             swung = inertia(model, c, motion.theta)[joint, joint]
-            soft = max(soft, float(np.max(c[model.compiled.place[name]] * swung)))
+            soft = max(soft, float(np.max(c[place] * swung)))
         reach = _REACH * max(1.0, _STIFF * np.sqrt(soft))
     own = replace(model, by_torque=False)  # the load on the links, friction or not
     for _ in range(_ROUNDS if tau is None else 1):
@@ -98,17 +97,16 @@ def turns(
     J : (2, q, N), `algid.model.sensitivity`
     """
     assert motion.load is not None
-    place = model.compiled.place
     compliance = np.zeros((2, 1))
-    for name, joint in attributes(model, "elastic"):
-        compliance[joint] = c[place[name]]
+    for place, joint in acting(model, "elastic"):
+        compliance[joint] = c[place]
         turn = np.zeros_like(motion.load)
         turn[:, joint] = -motion.load[:, joint]
-        yield place[name], turn
+        yield place, turn
     if not np.any(compliance):  # a rigid joint turns its link by no other coefficient
         return
     beside = {at: J[:, at] for at in set(range(len(model.names))).difference(inertial(model))}
-    for share, whole in of_motors(model):
+    for share, whole in acting(model, "of_motor"):
         if c[whole] == 0:  # of nothing no motor has a share
             continue
         of_rotor = J[:, whole] + (1 - c[share]) / c[whole] * J[:, share]
@@ -123,11 +121,10 @@ def with_bends(model: Model, c: FloatArray, motion: Motion, J: FloatArray, dt: f
     """J (2, q, N), in place, with what coefficients change by turning the links: see `turns`."""
     if motion.load is None:
         return J
-    compiled, factor = model.compiled, gains(model, c).reshape(2, -1)
-    own, of_links = inertial(model), Values(link_motion(model, c, motion), model.shape)
+    factor, of_links = gains(model, c).reshape(2, -1), Values(link_motion(model, c, motion), model)
     P = np.zeros((3, 2, 2, motion.theta.shape[1]))
-    for where, weighted in compiled.partials.items():
-        P[where] = summed(compiled.only(weighted, own), apart(model, c), of_links)
+    for where, weighted in model.compiled.only(inertial(model)).partials.items():
+        P[where] = summed(weighted, apart(model, c), of_links)
     for place, turn in list(turns(model, c, motion, J, dt)):
         J[:, place] += factor * np.einsum("oabn,obn->an", P, turn)
     return J

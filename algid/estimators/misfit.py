@@ -27,7 +27,7 @@ G       torques beside them                                (2 n, m)          N m
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -46,7 +46,7 @@ from algid.model import (
     TERMS,
     Model,
     Motion,
-    attributes,
+    acting,
     loads_of,
     names_of,
     regressor,
@@ -55,14 +55,12 @@ from algid.model import (
     torque,
     without_delay,
 )
-from algid.physics.motion import Widths
+from algid.physics.signals import WIDTHS
 from algid.physics.terms import ALWAYS
 
 if TYPE_CHECKING:
     from algid.estimators.fit import Fit
 
-WIDTHS = tuple(one.name for one in fields(Widths))
-"""Widths of friction, whose logarithms have a column where a term has that width."""
 TERM_OF = {name: term for term, entry in EVERY_TERM.items() for name in entry.names}
 _STAMPS = 0.01
 """Of a period: what stamps leave open at least, also in the log of a simulator."""
@@ -115,7 +113,7 @@ class Products:
     ) -> None:
         every = tuple(name for name, term in TERMS.items() if not term.lags or name in model.terms)
         self.shared = Shared(replace(model, terms=every), delay=True)
-        self.names = self.shared.log_names + WIDTHS
+        self.names = (*self.shared.log_names, *WIDTHS)
         rigid = within(self.names, loads_of(self.shared.model))
         both = len({log.loaded for log in logs}) == 2
         self._labels = self.names + both * rigid
@@ -132,8 +130,8 @@ class Products:
             gram, determinant = log.products(self.shared, c[:q], beside)
             if not all(driven):
                 # where a joint has no motor, its gain is nothing and makes its equation vanish
-                for name, _ in attributes(self.shared.model, "gains"):
-                    gram[:, self.names.index(name)] = gram[:, :, self.names.index(name)] = 0
+                for place, _ in acting(self.shared.model, "gains"):
+                    gram[:, place] = gram[:, :, place] = 0
             self.determinant += determinant
             self.each.append((log.loaded, gram.sum(axis=0)))
             # the torque itself in the place of what the point of linearisation leaves of it

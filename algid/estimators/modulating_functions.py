@@ -34,16 +34,16 @@ from algid.estimators.elastic import flexed, turns
 from algid.model import (
     Model,
     Motion,
+    acting,
     apart,
-    attributes,
     gains,
     inertial,
     link_motion,
     load,
-    of_motors,
     sensitivity,
+    smooth_sign,
 )
-from algid.physics.expressions import Product, Values
+from algid.physics.signals import WIDTHS, Expression, Product, Values
 from algid.signals.filters import correlate, differentiator, half_length
 from algid.signals.segments import Segment
 
@@ -187,18 +187,17 @@ class Windows:
 
         self._fill(X, model, motion, theta.shape[1], known)
         bends = None
-        if at is not None and attributes(model, "elastic"):
+        if at is not None and acting(model, "elastic"):
             bends = self._bend(X, model, at, motion(), tau)
-        for share, whole in of_motors(model):
+        for share, whole in acting(model, "of_motor"):
             X[:, share] = here[whole] * (X[:, share] - X[:, whole])
             if bends is not None:
                 bends[:, whole] += here[share] / (here[whole] or 1.0) * X[:, share]
-        if at is not None and attributes(model, "by_load"):
+        if at is not None and acting(model, "by_load"):
             omega = motion().omega
             L = load(model, at, Motion(theta, omega, np.gradient(omega, self.dt, axis=1)))
-            for name, joint in attributes(model, "by_load"):
-                dissipated = np.abs(L[joint]) * np.tanh(omega[joint] / model.coulomb_speed)
-                place = model.compiled.place[name]
+            for place, joint in acting(model, "by_load"):
+                dissipated = np.abs(L[joint]) * smooth_sign(model, omega[joint])
                 X[joint, place] = self.moments(dissipated[None], self._plain[0])[0]
         X *= gains(model, here)[:, None, None]
         X[:, -1] = self._of_torque(tau, 0, known)
@@ -287,28 +286,29 @@ class Windows:
         known: Known,
     ) -> None:
         """Write moments of the columns of τ = d²s/dt² + dp/dt + f to X: ∫φ″ s - ∫φ′ p + ∫φ f."""
-        compiled, shape, own = model.compiled, model.shape, self._own
+        own = self._own
 
         def key(order: int, product: Product) -> Hashable:
-            widths = tuple(getattr(shape, name) for name in _shapes(product))
+            widths = tuple(getattr(model, name) for name in _widths(product))
             return own, order, product, widths
 
         values: Values | None = None
-        for order, products in enumerate(compiled.products):
+        for order, (one, two) in enumerate(model.compiled.parts):
+            products = [product for product in {**one, **two} if product]
             missing = [product for product in products if key(order, product) not in known]
             if missing:
-                values = values or Values(motion(), shape)
+                values = values or Values(motion(), model)
                 signals = np.empty((len(missing), samples))
                 for signal, product in zip(signals, missing, strict=True):
                     signal[:] = values.of(product)
                 moments = self.moments(signals, self._plain[order])
                 known.update(zip([key(order, one) for one in missing], moments, strict=True))
-        for order, entries in enumerate((compiled.f, compiled.p, compiled.s)):
-            for joint, place, entry in entries:
-                for product, factor in entry.products.items():
+            for rows, weighted in zip(X, (one, two), strict=True):
+                for product, pairs in weighted.items():
                     # a window's integral is one, its derivatives' are nothing
                     moment = known[key(order, product)] if product else float(order == 0)
-                    X[joint, place] += (-1) ** order * factor * moment
+                    for place, factor in pairs:
+                        rows[place] += (-1) ** order * factor * moment
 
     def square_speeds(self, piece: Segment) -> FloatArray:
         """Each joint's squared velocity (2, R) in (rad/s)², averaged over `equations` windows."""
@@ -330,9 +330,10 @@ class Windows:
 
 
 @cache
-def _shapes(product: Product) -> tuple[str, ...]:
+def _widths(product: Product) -> list[str]:
     """The widths of friction that a product depends on."""
-    return tuple(sorted({name for atom in product for name in atom.shapes}))
+    leaves = Expression({product: 1.0}).leaves
+    return [name for name, width in WIDTHS.items() if width in leaves]
 
 
 @lru_cache(maxsize=32)
@@ -394,9 +395,8 @@ def _linearise_bilinear(X: FloatArray, model: Model, at: FloatArray) -> None:
     With Y the regressor at c0 and J the derivative there, τ = Y c0 + J (c - c0) is J c = τ + (J -
     Y) c0; J and Y differ in the columns of gains alone.
     """
-    place, factor = model.compiled.place, gains(model, at)
-    moved = []
-    for name, joint in attributes(model, "gains"):
-        X[joint, place[name]] = X[joint, : len(at)].T @ at / factor[joint]
-        moved.append(place[name])
+    factor, moved = gains(model, at), []
+    for place, joint in acting(model, "gains"):
+        X[joint, place] = X[joint, : len(at)].T @ at / factor[joint]
+        moved.append(place)
     X[:, -1] += np.einsum("j,ajr->ar", at[moved], X[:, moved])

@@ -43,7 +43,7 @@ from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem
 from algid.estimators.repeats import Groups, grouped
 from algid.estimators.weak import fit as weak_fit
-from algid.model import TERMS, attributes
+from algid.model import TERMS, acting
 from algid.notices import Notice
 from algid.signals.segments import Segment
 
@@ -132,7 +132,7 @@ def fit(problem: Problem) -> Fit:
     )
     tested, at = evenly_spread(logs, _MOST_TESTED), {}
     for log in tested:
-        log.smooth, log.by_motion = True, not attributes(shared.model, "elastic")
+        log.smooth, log.by_motion = True, not acting(shared.model, "elastic")
         c = shared.coefficients(fitted.values, log.loaded)
         at[log.loaded] = dict(zip(shared.log_names, c.tolist(), strict=True))
     try:

@@ -90,7 +90,7 @@ from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
 from algid.estimators.repeats import Groups, grouped, merged, shared_out
 from algid.estimators.weak import Normal
-from algid.model import DELAYS, EVERY_TERM, K3, K5, RIGID, SINES, TERMS, attributes
+from algid.model import DELAYS, EVERY_TERM, K3, K5, RIGID, SINES, TERMS, acting
 from algid.notices import Notice, Remedy
 from algid.signals.segments import Segment
 
@@ -136,7 +136,7 @@ def fit(problem: Problem) -> Fit:
     fit = robust.instruments_if_endogenous(least)
     if fit.intervals != "jackknife":
         fit = robust.with_scatter(fit, least, [{"window": window} for window in WINDOWS])
-    if attributes(least.shared.model, "by_load"):
+    if acting(least.shared.model, "by_load"):
         fit = robust.with_scatter(fit, least, [{"by_torque": True}])
     return robust.with_scatter(fit, least, [{"beside": True}])
 
@@ -227,7 +227,7 @@ class RobustProblem:
         beta, _ = weak.first_estimate(shared, solved, known)
         driven = {kind: _driven(own) for kind, own in normals.items()}
         share: FloatArray = np.ones(0)
-        rounds = _SOFT_ROUNDS if attributes(model, "elastic") else _ROUNDS
+        rounds = _SOFT_ROUNDS if acting(model, "elastic") else _ROUNDS
         for number in range(rounds):
             base = settings.shift.delay
             if number:

@@ -28,7 +28,7 @@ both kinds determine it and no payload need be guessed.
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Literal
 
@@ -58,7 +58,7 @@ from algid.model import (
     without_delay,
 )
 from algid.physics.effort import ELASTIC
-from algid.physics.motion import Widths
+from algid.physics.signals import WIDTHS
 from algid.signals.segments import pieces, spread_pieces
 
 CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and not term.lags)
@@ -152,7 +152,7 @@ def _using(shape: str) -> tuple[str, ...]:
 
 def needs_shape(terms: Sequence[str]) -> bool:
     """Whether some of `terms` have a width that is to be found."""
-    return any(not set(_using(shape.name)).isdisjoint(terms) for shape in fields(Widths))
+    return any(not set(_using(width)).isdisjoint(terms) for width in WIDTHS)
 
 
 _Piece = tuple[Source, dict[Hashable, Known]]

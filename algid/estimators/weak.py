@@ -39,7 +39,7 @@ from algid.estimators.innovations import LAGS, ResidualSums, pooled, residual_su
 from algid.estimators.modulating_functions import OVERLAP, Known, Windows, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
-from algid.model import DELAYS, K2, K4, attributes
+from algid.model import DELAYS, K2, K4, acting
 from algid.signals.differences import Stencil
 from algid.signals.segments import Segment, append, pieces
 
@@ -72,8 +72,8 @@ def fit(problem: Problem) -> Fit:
     settings, shared, prior = problem.settings, problem.shared, problem.prior
     model = settings.model
     iterated = [model.names.index(name) for name in model.iterated if name in model.names]
-    compliances = [name for name, _ in attributes(model, "elastic")]
-    soft = np.isin(model.names, compliances)
+    compliances = [place for place, _ in acting(model, "elastic")]
+    soft = np.isin(range(len(model.names)), compliances)
     at: dict[bool, FloatArray] = {}
     for _ in range(_PASSES):
         normals = {}

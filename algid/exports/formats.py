@@ -22,9 +22,10 @@ from algid.exports import template
 from algid.exports.description import Description, describe
 from algid.exports.links import Knowns
 from algid.identification.known import contradictions, covariance_of
-from algid.model import EVERY_TERM, SINES, TERMS, UNITS, Model, Weighted, attributes
+from algid.model import EVERY_TERM, SINES, TERMS, UNITS, Model, Weighted, acting
 from algid.notices import Notice
 from algid.options import flag
+from algid.physics.signals import OMEGA, Expression, text_of_sum
 from algid.results import Result
 
 SUFFIXES = {"urdf": ".urdf", "mjcf": ".xml", "sdf": ".sdf", "python": ".py", "c": ".c"}
@@ -127,12 +128,13 @@ def _program(arm: Description) -> dict[str, Any]:
     terms = [TERMS[name] for name in arm.model.terms]
     lacking = [term for term in terms if term.timing is not None or term.elastic]
     model = replace(arm.model, terms=outside(arm.model.terms, names_in(lacking)))
-    (M, n), (X, r) = model.compiled.of_load, model.compiled.beside_load
+    loads, beside = model.compiled.of_load, model.compiled.beside_load
+    M, n, X, r = loads.inertia, loads.rest, beside.inertia, beside.rest
     g = [
         {
             product: pairs
             for product, pairs in weighted.items()
-            if not any("omega" in name for atom in product for name in atom.slopes())
+            if not Expression({product: 1.0}).leaves.intersection(OMEGA)
         }
         for weighted in n
     ]
@@ -147,21 +149,17 @@ def _program(arm: Description) -> dict[str, Any]:
         ]
         content[name] = [_source(model, weighted) or "0.0" for weighted in held]
     for kind in ("gains", "by_load"):
-        names = attributes(model, kind)
-        content[kind] = [[one.upper() for one, of in names if of == joint] for joint in (0, 1)]
+        of_joint: list[list[str]] = [[], []]
+        for place, joint in acting(model, kind):
+            of_joint[joint].append(model.names[place].upper())
+        content[kind] = of_joint
     return content
 
 
 def _source(model: Model, weighted: Weighted) -> str:
     """An expression that is linear in the parameters, as text; none where it is nothing."""
-    return " + ".join(
-        " * ".join(
-            [
-                *([] if factor == 1 else [f"{factor:g}"]),
-                model.names[place].upper(),
-                *(atom.name for atom in product),
-            ]
-        )
+    return text_of_sum(
+        (factor, (model.names[place].upper(), *names_in(product)))
         for product, pairs in weighted.items()
         for place, factor in pairs
     )

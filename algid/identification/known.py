@@ -31,6 +31,7 @@ from algid.model import (
 from algid.notices import Notice, Remedy
 from algid.options import flag
 from algid.physics.effort import absent
+from algid.physics.signals import widths_of
 from algid.results import FitSummary, LogSummary, Result
 from algid.settings import DEFAULTS, Settings
 from algid.signals.shift import TorqueShift
@@ -51,7 +52,7 @@ def model_of(result: Result) -> Model:
     if result.fit is None or result.fit.model is None:
         return Model(without_delay(settings.terms), settings.gravity)
     model = result.fit.model
-    return Model(tuple(model.terms), settings.gravity, model.coulomb_speed, model.stribeck_speed)
+    return Model(tuple(model.terms), settings.gravity, **widths_of(model))
 
 
 def reused(profile: Profile | None, earlier: Result, file: str) -> Profile:

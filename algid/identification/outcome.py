@@ -25,9 +25,10 @@ from algid.identification.known import FAR
 from algid.identification.recordings import Recordings
 from algid.identification.series import predictor_of_fit
 from algid.identification.validate import prediction, scores
-from algid.model import DELAYS, K4, SINE_OF, UNITS, attributes
+from algid.model import DELAYS, K4, SINE_OF, UNITS, acting
 from algid.notices import Notice, codes_of, has_code, lossy, merged, of_codes
 from algid.physics.effort import absent
+from algid.physics.signals import widths_of
 from algid.results import Estimate, Result, Status
 from algid.results.verdict import LEAST_R2
 from algid.settings import Settings
@@ -230,8 +231,7 @@ def fit_summary(found: Fitted) -> results.FitSummary:
         unidentifiable=[one.text for one in fit.unidentifiable],
         model=results.TorqueModel(
             terms=list(chosen.model.terms),
-            coulomb_speed=chosen.model.coulomb_speed,
-            stribeck_speed=chosen.model.stribeck_speed,
+            **widths_of(chosen.model),
             chosen_by=chosen.chosen_by,
             shrunk=list(expected),
         ),
@@ -245,8 +245,8 @@ def fit_summary(found: Fitted) -> results.FitSummary:
         repeatability=repeated,
         torque_gain=gain,
         stiffness={
-            f"k_e{joint + 1}": _inverse(fit, name, 1.0, "N m/rad")
-            for name, joint in attributes(fit.shared.model, "elastic")
+            f"k_e{joint + 1}": _inverse(fit, fit.shared.model.names[place], 1.0, "N m/rad")
+            for place, joint in acting(fit.shared.model, "elastic")
         },
     )
 

@@ -1,135 +1,297 @@
-"""Signals of the terms of motion: angles, their sines and cosines, velocities, friction shapes.
+"""Signals of a motion and sums of their products: derived, evaluated and written out as text.
 
-=========  ==========================================  ======
-name       meaning                                     unit
-=========  ==========================================  ======
-Q1, Q2     θ1, θ2                                      rad
-W1, W2     ω1, ω2                                      rad/s
-A1, A2     θ̈1, θ̈2                                      rad/s²
-S1 … C12   sine and cosine of θ1, θ2, θ1 + θ2          1
-T1, T2     tanh(ω / ω_s), the smooth sign              1
-H1, H2     exp(-(ω / ω_S)²), Stribeck's fading         1
-=========  ==========================================  ======
+An atom is a signal that is no product of others: ω1, cos θ2, tanh(ω1 / ω_s). An expression is a sum
+of products of atoms with numbers before them. An atom that is a function states the function and
+its argument: its value, its text in C and Python and its derivatives follow.
+
+=========  ==================================================  =========================
+name       meaning                                             shape, unit
+=========  ==================================================  =========================
+E          expression, {(atom, atom, …): factor}               scalar at each sample
+Q1, Q2     θ1, θ2                                              (N,), rad
+W1, W2     ω1, ω2                                              (N,), rad/s
+S1 … C12   sine and cosine of θ1, θ2, θ1 + θ2                  (N,), 1
+T1, T2     tanh(ω / ω_s), the smooth sign                      (N,), 1
+H1, H2     exp(-(ω / ω_S)²), Stribeck's fading                 (N,), 1
+=========  ==================================================  =========================
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from itertools import chain, pairwise
+from typing import Any
 
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.physics.expressions import ONE, Atom, Expression
-from algid.physics.motion import Motion, Widths
+from algid.base.names import names_in
+
+Number = int | float
 
 
-def expression(atom: Atom) -> Expression:
-    """An atom as an expression."""
-    return Expression({(atom,): 1.0})
+@dataclass(frozen=True, eq=False)
+class Atom:
+    """A signal of a motion or one over a width; or a function of an expression of these.
+
+    Parameters
+    ----------
+    name : str
+        What it is called in exported sources.
+    function : NumPy's function, whose name C and Python have too, or None
+    argument : Expression
+        What it is a function of.
+    slope : callable
+        Its derivative by its argument. Called late: cosines derive from sines, and back.
+    """
+
+    name: str
+    function: np.ufunc | None = None
+    argument: Expression | None = None
+    slope: Callable[[], Expression] | None = None
+
+    def __lt__(self, other: Atom) -> bool:
+        return self.name < other.name
+
+    @property
+    def source(self) -> str:
+        """Its text, which C and Python read alike; "" for what every function is handed."""
+        if self.function is None or self.argument is None:
+            return ""
+        return f"{self.function.__name__}({self.argument.source()})"
+
+    @cached_property
+    def leaves(self) -> frozenset[Atom]:
+        """The signals and widths that it depends on."""
+        return frozenset([self]) if self.argument is None else self.argument.leaves
+
+    def by(self, leaf: Atom) -> Expression:
+        """Its derivative by a signal."""
+        if self is leaf:
+            return ONE
+        if leaf not in self.leaves or self.argument is None or self.slope is None:
+            return NOTHING
+        return self.slope() * self.argument.by(leaf)
 
 
-def _channel(name: str, quantity: str, joint: int) -> Atom:
-    """A row of the motion itself."""
-    signal = f"{quantity}{joint + 1}"
-
-    def value(motion: Motion, _shape: Widths) -> FloatArray:
-        row: FloatArray = getattr(motion, quantity)[joint]
-        return row
-
-    return Atom(name, value, "", lambda: {signal: ONE})
+Product = tuple[Atom, ...]
 
 
-def _trigonometric(name: str, place: int, source: str, turned: str, sign: float) -> Atom:
-    """A sine or a cosine; its derivative is `sign` times the one called `turned`."""
+@dataclass(frozen=True, eq=False)
+class Expression:
+    """A sum of products, each with its factor.
 
-    def slopes() -> Mapping[str, Expression]:
-        slope = expression(_TRIGONOMETRIC[turned]) * sign
-        return {f"theta{joint}": slope for joint in name[1:]}
+    No product stands twice, and none with a factor of zero.
+    """
 
-    return Atom(name, lambda motion, _shape: motion.trigonometry[place], source, slopes)
+    products: Mapping[Product, float]
 
+    def __add__(self, other: Expression | Number) -> Expression:
+        total = dict(self.products)
+        for product, factor in as_expression(other).products.items():
+            total[product] = total.get(product, 0.0) + factor
+        return Expression({product: factor for product, factor in total.items() if factor})
 
-_TRIGONOMETRIC = {
-    "s1": _trigonometric("s1", 0, "sin(q1)", "c1", 1.0),
-    "c1": _trigonometric("c1", 1, "cos(q1)", "s1", -1.0),
-    "s2": _trigonometric("s2", 2, "sin(q2)", "c2", 1.0),
-    "c2": _trigonometric("c2", 3, "cos(q2)", "s2", -1.0),
-    "s12": _trigonometric("s12", 4, "sin(q1 + q2)", "c12", 1.0),
-    "c12": _trigonometric("c12", 5, "cos(q1 + q2)", "s12", -1.0),
-}
+    def __mul__(self, other: Expression | Number) -> Expression:
+        total = NOTHING
+        for first, factor in self.products.items():
+            for second, by in as_expression(other).products.items():
+                total = total + Expression({tuple(sorted(first + second)): factor * by})
+        return total
 
+    def __sub__(self, other: Expression | Number) -> Expression:
+        return self + as_expression(other) * -1.0
 
-def _none() -> Mapping[str, Expression]:
-    return {}
+    def __neg__(self) -> Expression:
+        return self * -1.0
 
+    __radd__ = __add__
+    __rmul__ = __mul__
 
-def _width(name: str, which: str) -> Atom:
-    """One over a width of friction."""
+    def __rsub__(self, other: Expression | Number) -> Expression:
+        return as_expression(other) - self
 
-    def constant(shape: Widths) -> float:
-        return 1 / float(getattr(shape, which))
+    def by(self, leaf: Atom) -> Expression:
+        """The derivative by a signal."""
+        total = NOTHING
+        for product, factor in self.products.items():
+            for place, atom in enumerate(product):
+                rest = Expression({product[:place] + product[place + 1 :]: factor})
+                total = total + atom.by(leaf) * rest
+        return total
 
-    return Atom(
-        name, lambda _motion, shape: np.asarray(constant(shape)), "", _none, constant, (which,)
-    )
+    @property
+    def leaves(self) -> frozenset[Atom]:
+        """The signals and widths that it depends on."""
+        return frozenset().union(*(atom.leaves for atom in chain(*self.products)))
 
-
-COULOMB_RATE = expression(_width("COULOMB_RATE", "coulomb_speed"))
-STRIBECK_RATE = expression(_width("STRIBECK_RATE", "stribeck_speed"))
-
-
-def _sign(joint: int) -> Atom:
-    """The smooth sign of a velocity, tanh(ω / ω_s)."""
-
-    def slopes() -> Mapping[str, Expression]:
-        t = expression(_SIGNS[joint])
-        return {f"omega{joint + 1}": (1 - t * t) * COULOMB_RATE}
-
-    def value(motion: Motion, shape: Widths) -> FloatArray:
-        return np.tanh(motion.omega[joint] / shape.coulomb_speed)
-
-    text = f"tanh(w{joint + 1} / COULOMB_SPEED)"
-    return Atom(f"t{joint + 1}", value, text, slopes, shapes=("coulomb_speed",))
-
-
-def _fading(joint: int) -> Atom:
-    """What is left of Stribeck's friction at a velocity, exp(-(ω / ω_S)²)."""
-
-    def slopes() -> Mapping[str, Expression]:
-        w = (W1, W2)[joint]
-        return {
-            f"omega{joint + 1}": expression(_FADINGS[joint])
-            * w
-            * STRIBECK_RATE
-            * STRIBECK_RATE
-            * -2.0
-        }
-
-    def value(motion: Motion, shape: Widths) -> FloatArray:
-        return np.exp(-((motion.omega[joint] / shape.stribeck_speed) ** 2))
-
-    part = f"(w{joint + 1} / STRIBECK_SPEED)"
-    text = f"exp(-{part} * {part})"
-    return Atom(f"h{joint + 1}", value, text, slopes, shapes=("stribeck_speed",))
+    def source(self) -> str:
+        """Its text, which C and Python read alike; "" for a sum of nothing."""
+        return text_of_sum((factor, names_in(product)) for product, factor in self.products.items())
 
 
-_SIGNS, _FADINGS = (_sign(0), _sign(1)), (_fading(0), _fading(1))
-ACCELERATIONS = (_channel("alpha1", "alpha", 0), _channel("alpha2", "alpha", 1))
+def text_of_sum(parts: Iterable[tuple[float, Sequence[str]]]) -> str:
+    """A sum of products, each a number and names, as text that C and Python read alike."""
+    products = []
+    for factor, names in parts:
+        number = [] if names and factor == 1 else [f"{factor:g}"]
+        products.append(" * ".join([*number, *names]))
+    return " + ".join(products)
 
-Q1, Q2 = (expression(_channel(f"q{joint + 1}", "theta", joint)) for joint in range(2))
-W1, W2 = (expression(_channel(f"w{joint + 1}", "omega", joint)) for joint in range(2))
-A1, A2 = map(expression, ACCELERATIONS)
-S1, C1, S2, C2, S12, C12 = map(expression, _TRIGONOMETRIC.values())
-T1, T2 = map(expression, _SIGNS)
-H1, H2 = map(expression, _FADINGS)
 
-RATES = {"theta1": W1, "theta2": W2, "omega1": A1, "omega2": A2}
-"""What each signal's derivative by time is."""
+NOTHING = Expression({})
+ONE = Expression({(): 1.0})
+
+
+def as_expression(value: Expression | Atom | Number) -> Expression:
+    """A number or an atom as an expression."""
+    if isinstance(value, Expression):
+        return value
+    if isinstance(value, Atom):
+        return Expression({(value,): 1.0})
+    return Expression({(): float(value)}) if value else NOTHING
+
+
+@dataclass(frozen=True, kw_only=True)
+class Widths:
+    """The widths of friction.
+
+    Parameters
+    ----------
+    coulomb_speed : float, rad/s
+        ω_s: speed at which Coulomb friction has reached three quarters of its value.
+    stribeck_speed : float, rad/s
+        ω_S: speed at which a third of Stribeck's additional friction is left.
+    """
+
+    coulomb_speed: float = 0.2
+    stribeck_speed: float = 0.3
+
+
+WIDTHS = {one.name: Atom(f"(1 / {one.name.upper()})") for one in fields(Widths)}
+"""One over each width, by the width's name."""
+
+
+def widths_of(holder: object) -> dict[str, Any]:
+    """The widths of friction among the attributes of a model, or of what a result says of it."""
+    return {name: float(getattr(holder, name)) for name in WIDTHS}
+
+
+THETA = (Atom("q1"), Atom("q2"))
+OMEGA = (Atom("w1"), Atom("w2"))
+ALPHA = (Atom("alpha1"), Atom("alpha2"))
+MOTION = (THETA, OMEGA, ALPHA)
+"""By the order of θ's derivative: each pair is the one before derived by time."""
+
+Q1, Q2 = map(as_expression, THETA)
+W1, W2 = map(as_expression, OMEGA)
+
+
+def function(
+    name: str,
+    function: np.ufunc,
+    argument: Expression,
+    slope: Callable[[], Expression],
+) -> Expression:
+    """A function of an expression: see `Atom`."""
+    return as_expression(Atom(name, function, argument, slope))
+
+
+S1: Expression = function("s1", np.sin, Q1, lambda: C1)
+C1: Expression = function("c1", np.cos, Q1, lambda: -S1)
+S2: Expression = function("s2", np.sin, Q2, lambda: C2)
+C2: Expression = function("c2", np.cos, Q2, lambda: -S2)
+S12: Expression = function("s12", np.sin, Q1 + Q2, lambda: C12)
+C12: Expression = function("c12", np.cos, Q1 + Q2, lambda: -S12)
+TRIGONOMETRY = (S1, C1, S2, C2, S12, C12)
+"""As `Motion.trigonometry` has their values."""
+
+_RATE = as_expression(WIDTHS["coulomb_speed"])
+T1: Expression = function("t1", np.tanh, W1 * _RATE, lambda: 1 - T1 * T1)
+T2: Expression = function("t2", np.tanh, W2 * _RATE, lambda: 1 - T2 * T2)
+
+_FADING_RATE = as_expression(WIDTHS["stribeck_speed"])
+H1: Expression = function("h1", np.exp, -W1 * W1 * _FADING_RATE * _FADING_RATE, lambda: H1)
+H2: Expression = function("h2", np.exp, -W2 * W2 * _FADING_RATE * _FADING_RATE, lambda: H2)
 
 
 def rate(e: Expression) -> Expression:
     """The derivative by time of an expression without accelerations."""
-    total = Expression({})
-    for signal, speed in RATES.items():
-        total = total + e.by(signal) * speed
+    total = NOTHING
+    for signals, speeds in pairwise(MOTION):
+        for signal, speed in zip(signals, speeds, strict=True):
+            total = total + e.by(signal) * as_expression(speed)
     return total
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Angles, velocities, accelerations (2, N) and what eq. (1) needs of them.
+
+    `load` (3, 2, N) is what bends the joints where they are elastic, in N m, with its two rates.
+    """
+
+    theta: FloatArray
+    omega: FloatArray
+    alpha: FloatArray
+    load: FloatArray | None = None
+
+    @cached_property
+    def trigonometry(self) -> tuple[FloatArray, ...]:
+        """Sine and cosine of θ1, of θ2 and of θ1 + θ2, each (N,)."""
+        (s1, s2), (c1, c2) = sine_cosine(self.theta)
+        return s1, c1, s2, c2, s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
+
+
+def sine_cosine(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sine and cosine of angles, each in the shape of `theta`, by one tangent of the half angle.
+
+    Exact to a unit in the last place of 1, also where the tangent has its poles. NumPy has vector
+    instructions for the tangent on more processors than for sine and cosine: this is several times
+    faster there.
+    """
+    half = np.tan(0.5 * theta)
+    square = half * half
+    scale = 1 / (1 + square)
+    return 2 * half * scale, (1 - square) * scale
+
+
+class Values:
+    """Values of products along one motion, each worked out once.
+
+    Parameters
+    ----------
+    motion : Motion of N samples
+    widths : Widths
+    """
+
+    def __init__(self, motion: Motion, widths: Widths) -> None:
+        self._known: dict[Product, FloatArray | float] = {(): 1.0}
+        for name, width in widths_of(widths).items():
+            self._known[(WIDTHS[name],)] = 1 / width
+        for atoms, signals in zip(MOTION, (motion.theta, motion.omega, motion.alpha), strict=True):
+            self._known |= {(atom,): signal for atom, signal in zip(atoms, signals, strict=True)}
+        for e, signal in zip(TRIGONOMETRY, motion.trigonometry, strict=True):
+            self._known |= dict.fromkeys(e.products, signal)
+
+    def of(self, product: Product) -> FloatArray | float:
+        """The value of a product (N,); a float where no motion changes it."""
+        if product not in self._known:
+            *before, last = product
+            if before:
+                value = self.of(tuple(before)) * self.of((last,))
+            else:
+                assert last.function is not None
+                assert last.argument is not None
+                value = last.function(self.sum(last.argument))
+            self._known[product] = value
+        return self._known[product]
+
+    def sum(self, e: Expression) -> FloatArray | float:
+        """The value of an expression (N,), or a float."""
+        total: FloatArray | float = 0.0
+        for product, factor in e.products.items():
+            total = total + factor * self.of(product)
+        return total

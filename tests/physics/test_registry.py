@@ -22,20 +22,18 @@ TOY = '''"""Cogging of joint 2: a torque that repeats six times a turn."""
 
 import numpy as np
 
-from algid.physics.expressions import NOTHING, Atom, Expression
 from algid.physics.parameters import MOMENT, Parameter
+from algid.physics.signals import NOTHING, Q2, function
 from algid.physics.terms.base import Term, TorqueColumn
 
-SINE = Atom("toy_s", lambda motion, _: np.sin(6 * motion.theta[1]), "sin(6 * q2)",
-            lambda: {"theta2": Expression({(COSINE,): 6.0})})
-COSINE = Atom("toy_c", lambda motion, _: np.cos(6 * motion.theta[1]), "cos(6 * q2)",
-              lambda: {"theta2": Expression({(SINE,): -6.0})})
+SINE = function("toy_s", np.sin, 6 * Q2, lambda: COSINE)
+COSINE = function("toy_c", np.cos, 6 * Q2, lambda: -SINE)
 TOY = Term(
     name="toy",
     title="cogging of joint 2",
     equation="g6 sin(6 θ_2) (joint 2)",
     parameters=(Parameter("g6", "g6", "N m", "cogging moment of joint 2", MOMENT),),
-    columns=(TorqueColumn("g6", f=(NOTHING, Expression({(SINE,): 1.0}))),),
+    columns=(TorqueColumn("g6", f=(NOTHING, SINE)),),
 )
 '''
 READER = '''"""Logs that begin with a line TOYLOG: a table of text."""
@@ -132,7 +130,8 @@ for to in ("python", "c"):
     assert "G6 * toy_s" in text and "sin(6 * q2)" in text, text
 module = {}
 exec(compile(exported(result, "toy.algid", "python", {})[0], "arm.py", "exec"), module)
-model = Model(tuple(result.fit.model.terms), 9.81, result.fit.model.coulomb_speed)
+speed = result.fit.model.coulomb_speed
+model = Model(tuple(result.fit.model.terms), 9.81, coulomb_speed=speed)
 c = np.array([result.parameters[name].estimate for name in model.names])
 one = np.array([[0.3], [0.4]])
 ours = torque(model, c, Motion(one, one, one))[:, 0]

@@ -13,9 +13,7 @@ from algid.arm import FloatArray
 from algid.estimators.modulating_functions import Windows
 from algid.model import EVERY_TERM, TERMS, Model, Motion, partials, regressor, torque
 from algid.physics.effort import Effort, absent, without_terms
-from algid.physics.expressions import Values
-from algid.physics.motion import Widths
-from algid.physics.signals import C12, S1, W2
+from algid.physics.signals import C12, S1, W2, Values, Widths
 from algid.physics.terms import ALWAYS, OPTIONAL
 from algid.signals.segments import Segment
 from tests.estimators.test_model import VALUES
@@ -112,10 +110,9 @@ def test_an_expression_its_sum_and_its_source_are_one_number(one: float, two: fl
     e, motion = one * S1 * W2 + two * C12 - two, moving(0.05)
     (q1, q2), (_, w2) = motion.theta, motion.omega
     expected = one * np.sin(q1) * w2 + two * np.cos(q1 + q2) - two
-    values, place = Values(motion, Widths()), np.empty(q1.size)
-    values.into(place, e)
+    value = Values(motion, Widths()).sum(e)
     known = {"s1": np.sin(q1), "w2": w2, "c12": np.cos(q1 + q2)}
-    for found in (values.sum(e), place, eval(e.source(), known)):
+    for found in (value, eval(e.source(), known)):
         np.testing.assert_allclose(found, expected, atol=1e-14)
 
 

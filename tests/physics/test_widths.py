@@ -7,8 +7,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from algid.physics.expressions import Atom
-from algid.physics.motion import Motion, Widths
+from algid.physics.signals import WIDTHS, Atom, Motion, Values, Widths
 from algid.physics.terms import ALWAYS, OPTIONAL
 
 
@@ -19,7 +18,8 @@ def atoms() -> list[Atom]:
         for column in term.columns
         for vector in (column.s, column.p, column.f)
     )
-    found = {atom for vector in vectors for entry in vector for atom in entry.atoms}
+    entries = (entry for vector in vectors for entry in vector)
+    found = {atom for entry in entries for product in entry.products for atom in product}
     return sorted(found)
 
 
@@ -30,7 +30,7 @@ def test_an_atom_names_the_widths_that_change_it(width: str) -> None:
     motion = Motion(*rng.standard_normal((3, 2, 50)))
     narrow = Widths()
     wide = replace(narrow, **{width: 2 * getattr(narrow, width)})
-    assert any(width in atom.shapes for atom in atoms())
+    assert any(WIDTHS[width] in atom.leaves for atom in atoms())
     for atom in atoms():
-        changed = not np.array_equal(atom.value(motion, narrow), atom.value(motion, wide))
-        assert changed == (width in atom.shapes), atom.name
+        one, other = (Values(motion, widths).of((atom,)) for widths in (narrow, wide))
+        assert np.array_equal(one, other) != (WIDTHS[width] in atom.leaves), atom.name

@@ -1,8 +1,7 @@
 """Coulomb friction that differs between the two directions."""
 
-from algid.physics.expressions import NOTHING
 from algid.physics.parameters import MOMENT, Parameter
-from algid.physics.signals import T1, T2
+from algid.physics.signals import NOTHING, T1, T2
 from algid.physics.terms.base import PriorSpread, Term, TorqueColumn
 
 ASYMMETRY = Term(

@@ -11,12 +11,15 @@ has no columns.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
 from typing import Literal
 
 from algid.base.names import names_in
-from algid.physics.expressions import NOTHING, Expression
 from algid.physics.parameters import Parameter
+from algid.physics.signals import MOTION, NOTHING, Atom, Expression, rate
 
 Vector = tuple[Expression, Expression]
 NONE: Vector = (NOTHING, NOTHING)
@@ -30,6 +33,18 @@ class TorqueColumn:
     s: Vector = NONE
     p: Vector = NONE
     f: Vector = NONE
+
+    @cached_property
+    def torque(self) -> Vector:
+        """What it adds to each joint's torque."""
+        one, two = map(lambda s, p, f: rate(rate(s)) + rate(p) + f, self.s, self.p, self.f)
+        return one, two
+
+    @cached_property
+    def partials(self) -> Mapping[Atom, Vector]:
+        """The derivatives of its torque by angles, velocities and accelerations."""
+        one, two = self.torque
+        return {signal: (one.by(signal), two.by(signal)) for signal in chain(*MOTION)}
 
 
 @dataclass(frozen=True)
@@ -71,7 +86,7 @@ class Term:
         and gravity.
     usual : bool
         Whether most real joints have it: other terms are weighed beside it first.
-    shapes : names of the widths that its columns have, fields of `algid.physics.motion.Widths`
+    shapes : names of the widths that its columns have, fields of `algid.physics.signals.Widths`
     by_load : pairs of a parameter and a joint: load times smooth sign of velocity it multiplies
     elastic : pairs of a parameter and the joint whose compliance it is
     of_motor : pairs of a parameter and the one of which it is the motor's share, by name

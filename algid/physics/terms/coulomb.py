@@ -5,9 +5,8 @@ tanh(ω / ω_s) in place of a jump, so that noise at standstill flips no sample.
 
 from math import inf
 
-from algid.physics.expressions import NOTHING
 from algid.physics.parameters import MOMENT, Parameter
-from algid.physics.signals import T1, T2
+from algid.physics.signals import NOTHING, T1, T2
 from algid.physics.terms.base import PriorSpread, Term, TorqueColumn
 
 COULOMB = Term(

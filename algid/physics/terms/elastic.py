@@ -9,9 +9,8 @@ friction and rotors those of the motors' (Spong 1987). The load is that of the e
 
 from math import inf
 
-from algid.physics.expressions import NOTHING
 from algid.physics.parameters import COMPLIANCE, SHARE, Parameter
-from algid.physics.signals import Q1
+from algid.physics.signals import NOTHING, Q1
 from algid.physics.terms.base import PriorSpread, Term, TorqueColumn
 
 ELASTIC = Term(

@@ -1,7 +1,7 @@
 """Torque offsets: what a sensor or a drive adds whatever the arm does."""
 
-from algid.physics.expressions import NOTHING, ONE
 from algid.physics.parameters import MOMENT, Parameter
+from algid.physics.signals import NOTHING, ONE
 from algid.physics.terms.base import PriorSpread, Term, TorqueColumn
 
 OFFSET = Term(

@@ -5,9 +5,8 @@ with the angle a quarter turn on. With centres of mass turned by δ off the link
 zeros off by ε, arg K1 = δ2 + ε2 and arg K2 = δ2 + ε1 + ε2.
 """
 
-from algid.physics.expressions import NOTHING
 from algid.physics.parameters import INERTIA, MOMENT, Parameter
-from algid.physics.signals import C2, S1, S2, S12, W1, W2
+from algid.physics.signals import C2, NOTHING, S1, S2, S12, W1, W2
 from algid.physics.terms.base import PriorSpread, Term, TorqueColumn
 
 PHASES = Term(

@@ -3,9 +3,8 @@
 2023.
 """
 
-from algid.physics.expressions import NOTHING
 from algid.physics.parameters import INERTIA, MOMENT, Parameter
-from algid.physics.signals import C1, C2, C12, Q1, Q2, S2, W1, W2
+from algid.physics.signals import C1, C2, C12, NOTHING, Q1, Q2, S2, W1, W2
 from algid.physics.terms.base import Term, TorqueColumn
 
 RIGID = Term(

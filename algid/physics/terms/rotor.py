@@ -5,9 +5,8 @@ That of joint 1 adds to k5 alone, which is why it has no column.
 
 from math import inf
 
-from algid.physics.expressions import NOTHING
 from algid.physics.parameters import INERTIA, Parameter
-from algid.physics.signals import Q2
+from algid.physics.signals import NOTHING, Q2
 from algid.physics.terms.base import PriorSpread, Term, TorqueColumn
 
 ROTOR = Term(

@@ -1,8 +1,7 @@
 """Stribeck friction: what Coulomb friction has more at low speed."""
 
-from algid.physics.expressions import NOTHING
 from algid.physics.parameters import MOMENT, Parameter
-from algid.physics.signals import H1, H2, T1, T2
+from algid.physics.signals import H1, H2, NOTHING, T1, T2
 from algid.physics.terms.base import PriorSpread, Term, TorqueColumn
 
 STRIBECK = Term(

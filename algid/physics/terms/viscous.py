@@ -1,9 +1,8 @@
 """Viscous friction of both joints, the rest of eq. (1)."""
 
-from algid.physics.expressions import NOTHING
 from algid.physics.parameters import VISCOUS as SCALE
 from algid.physics.parameters import Parameter
-from algid.physics.signals import Q1, Q2
+from algid.physics.signals import NOTHING, Q1, Q2
 from algid.physics.terms.base import Term, TorqueColumn
 
 VISCOUS = Term(
