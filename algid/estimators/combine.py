@@ -18,6 +18,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
+from operator import add
 
 import numpy as np
 
@@ -50,6 +51,10 @@ class LogInformation:
     def about(self, c: FloatArray) -> LogInformation:
         """The same likelihood, with its score at other coefficients `c` (q,)."""
         return LogInformation(self.loaded, c, self.S, self.g - self.S @ (c - self.c0))
+
+    def scaled(self, share: float) -> LogInformation:
+        """The likelihood of so large a share of the log."""
+        return LogInformation(self.loaded, self.c0, share * self.S, share * self.g)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,9 +95,8 @@ def joined(first: Prior | None, second: Prior) -> Prior:
     """What two priors on different parameters know together."""
     if first is None:
         return second
-    size = len(first.names)
-    precision = np.zeros((size + len(second.names),) * 2)
-    precision[:size, :size], precision[size:, size:] = first.precision, second.precision
+    between = np.zeros((len(first.names), len(second.names)))
+    precision = np.block([[first.precision, between], [between.T, second.precision]])
     mean = np.concatenate([first.mean, second.mean])
     return Prior(first.names + second.names, mean, precision, first.absent + second.absent)
 
@@ -104,7 +108,7 @@ def without(prior: Prior | None, absent: tuple[str, ...]) -> Prior | None:
     """What is known beforehand where the parameters `absent` are nothing."""
     if not absent:
         return prior
-    none = Prior(absent, np.zeros(len(absent)), np.diag([_NOTHING**-2] * len(absent)), absent)
+    none = Prior(absent, np.zeros(len(absent)), np.eye(len(absent)) / _NOTHING**2, absent)
     return joined(None if prior is None else prior.silent_on(absent), none)
 
 
@@ -146,11 +150,11 @@ def combine(
 
     Returns
     -------
-    beta (Q,), its information (Q, Q), and the log-likelihood there less that of each log's own
-    coefficients c0
+    beta (Q,), its information (Q, Q), and the log-likelihood there less that of each kind's logs at
+    the coefficients c0 of the first
     """
     damping = 0.0
-    logs, offset = by_kind(logs)
+    logs = by_kind(logs)
     value, gradient, S = likelihood(shared, logs, beta, prior)
     for _ in range(_STEPS):
         step = scaled_pinv(S + damping * np.diag(np.diag(S))) @ gradient
@@ -162,14 +166,11 @@ def combine(
             continue
         gain = float(gradient @ step)
         beta = beta + step
-        if damping > 1e-6:
-            damping /= 10
-        else:
-            damping = 0.0
+        damping = damping / 10 if damping > 1e-6 else 0.0
         value, gradient, S = trial
         if gain < _DONE and damping == 0.0:
             break
-    return beta, S, value + offset
+    return beta, S, value
 
 
 def of_kind(logs: Iterable[LogInformation], loaded: bool) -> list[LogInformation]:
@@ -177,21 +178,17 @@ def of_kind(logs: Iterable[LogInformation], loaded: bool) -> list[LogInformation
     return [log for log in logs if log.loaded is loaded]
 
 
-def by_kind(logs: Iterable[LogInformation]) -> tuple[list[LogInformation], float]:
-    """Unloaded and loaded logs in one sum each, and what that adds to their likelihood."""
-    sums, offset = list[LogInformation](), 0.0
+def by_kind(logs: Iterable[LogInformation]) -> list[LogInformation]:
+    """Unloaded and loaded logs in one sum each, at the coefficients c0 of the first."""
+    sums = []
     for loaded in (False, True):
         own = of_kind(logs, loaded)
-        if len(own) < 2:
-            sums += own
-            continue
-        S, g = map(np.stack, zip(*(log.total for log in own), strict=True))
-        change = own[0].c0 - np.stack([log.c0 for log in own])
-        fall = np.einsum("lij,lj->li", S, change)
-        offset += float(np.sum((g - 0.5 * fall) * change))
-        total = S.sum(axis=0)[None], (g - fall).sum(axis=0)[None]
-        sums.append(LogInformation(loaded, own[0].c0, *total))
-    return sums, offset
+        if own:
+            S, g = map(np.stack, zip(*(log.total for log in own), strict=True))
+            change = own[0].c0 - np.stack([log.c0 for log in own])
+            score = g.sum(axis=0) - np.einsum("lij,lj->i", S, change)
+            sums.append(LogInformation(loaded, own[0].c0, S.sum(axis=0)[None], score[None]))
+    return sums
 
 
 def likelihood(
@@ -305,15 +302,6 @@ def rank(S: FloatArray) -> int:
     return max(1, int(np.sum(np.diag(S) > 0)))
 
 
-def precision_of(prior: Prior | None, shared: Shared) -> FloatArray:
-    """What a prior knows of all shared parameters (Q, Q)."""
-    precision = np.zeros((len(shared.names),) * 2)
-    if prior is not None:
-        places = prior.places(shared.names)
-        precision[np.ix_(places, places)] = prior.precision
-    return precision
-
-
 def left_out(
     shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None = None
 ) -> FloatArray:
@@ -324,14 +312,13 @@ def left_out(
     """
     nothing = list[LogInformation]()
     before, behind = (
-        list(accumulate(own, lambda sums, log: by_kind([*sums, log])[0], initial=nothing))
+        list(accumulate(own, lambda sums, log: by_kind([*sums, log]), initial=nothing))
         for own in (logs, logs[::-1])
     )
-    estimates = np.empty((len(logs), len(shared.names)))
-    for place in range(len(logs)):
-        others = [*before[place], *behind[-2 - place]]
-        estimates[place] = combine(shared, others, beta, prior)[0]
-    return estimates
+    estimates = []
+    for others in map(add, before, behind[-2::-1]):
+        estimates.append(combine(shared, others, beta, prior)[0])
+    return np.array(estimates)
 
 
 FEWEST_LOGS = 4
@@ -368,23 +355,22 @@ class BlockSums:
     """Sums (B, ...) over consecutive stretches, B at most `2 * MOST_BLOCKS`."""
 
     def __init__(self) -> None:
-        self._full: list[FloatArray] = []
-        self._count = 0
-        self._rest: FloatArray | None = None  # stretches that do not fill a sum yet
-        self._factor = 1
+        self._sums: list[FloatArray] = []
+        self._factor = 1  # stretches in a sum
+        self._missing = 0  # of them that the last sum still lacks
 
     def add(self, blocks: FloatArray) -> None:
         """Append the sums (b, ...) of the next b stretches."""
-        if self._rest is not None:
-            blocks = np.concatenate([self._rest, blocks])
-        while count := min(len(blocks) // self._factor, 2 * MOST_BLOCKS - self._count):
-            taken, blocks = np.split(blocks, [count * self._factor])
-            self._full.append(_added(taken, self._factor))
-            self._count += count
-            if self._count == 2 * MOST_BLOCKS:
-                self._full = [_added(np.concatenate(self._full), 2)]
-                self._count, self._factor = MOST_BLOCKS, 2 * self._factor
-        self._rest = blocks
+        for block in blocks:
+            if self._missing:
+                self._sums[-1] += block
+                self._missing -= 1
+                continue
+            if len(self._sums) == 2 * MOST_BLOCKS:
+                self._sums = list(map(add, self._sums[::2], self._sums[1::2]))
+                self._factor *= 2
+            self._sums.append(block.copy())
+            self._missing = self._factor - 1
 
     def values(self) -> FloatArray:
         """All sums (B, ...) in time order; the last stretch may be shorter.
@@ -394,15 +380,7 @@ class BlockSums:
         ValueError
             If nothing was added.
         """
-        if self._rest is None:
-            raise ValueError("no blocks were added")
-        last = self._rest.sum(axis=0, keepdims=True)[: len(self._rest)]
-        return np.concatenate([*self._full, last])
-
-
-def _added(blocks: FloatArray, factor: int) -> FloatArray:
-    """Sums of each `factor` blocks (b, ...) that follow one another."""
-    return blocks.reshape((-1, factor) + blocks.shape[1:]).sum(axis=1)
+        return np.stack(self._sums)
 
 
 def long_run_variance(scores: FloatArray) -> tuple[FloatArray, int]:

@@ -24,7 +24,7 @@ from algid.estimators.combine import (
     combine,
     jackknife,
     left_out,
-    precision_of,
+    likelihood,
     sandwich,
     scaled_pinv,
     scatters,
@@ -114,10 +114,8 @@ class Fit:
     @property
     def delay(self) -> float | None:
         """The torque's delay in s, where it is estimated."""
-        for name in DELAYS:
-            if name in self.names:
-                return float(self.values[self.names.index(name)])
-        return None
+        delays = self.values[np.isin(self.names, DELAYS)]
+        return float(delays[0]) if delays.size else None
 
     @property
     def absent(self) -> tuple[str, ...]:
@@ -173,10 +171,11 @@ class Fit:
 
     def marked(self, status: Status, names: Collection[str] | None = None) -> Fit:
         """The fit with `status` in the place of OK, for the parameters `names`, by default all."""
-        marked = list(self.status)
-        for place, name in enumerate(self.names):
-            if marked[place] == "OK" and (names is None or name in names):
-                marked[place] = status
+        chosen = self.names if names is None else names
+        marked = [
+            status if before == "OK" and name in chosen else before
+            for name, before in zip(self.names, self.status, strict=True)
+        ]
         return replace(self, status=tuple(marked))
 
     @property
@@ -210,19 +209,14 @@ class Fit:
         A sum may be known where its terms are not: k3 + k5 of an arm whose second joint never
         moved.
         """
-        if not np.any((share != 0) & np.isinf(self.std)):
-            return float(np.sqrt(max(float(share @ self.covariance @ share), 0.0)))
-        _, S, _ = combine(self.shared, self.logs, self.values, self.prior)
-        null, size = open_directions(self.names, self.values, S)
-        scaled = share * size
-        along = null.T @ scaled
-        if np.linalg.norm(along) > 1e-3 * np.linalg.norm(scaled):
-            return float("inf")
-        determined = (scaled - null @ along) / size
-        return float(np.sqrt(max(float(determined @ self.covariance @ determined), 0.0)))
-
-
-_STATUS: dict[bool, Status] = {True: "OK", False: "NOT_IDENTIFIABLE"}
+        if np.any((share != 0) & np.isinf(self.std)):
+            _, S, _ = combine(self.shared, self.logs, self.values, self.prior)
+            null, size = open_directions(self.names, self.values, S)
+            along = null.T @ (share * size)
+            if np.linalg.norm(along) > 1e-3 * np.linalg.norm(share * size):
+                return float("inf")
+            share = share - null @ along / size
+        return float(np.sqrt(max(float(share @ self.covariance @ share), 0.0)))
 
 
 def finish(
@@ -272,41 +266,33 @@ def finish(
     how the logs' scores differ, or the sandwich's.
     """
     beta, S, _ = combine(shared, logs, beta, prior)
-    bounded: tuple[str, ...] = ()
-    if prior is not None:
-        bounded = prior.absent
-    if shrinkage is not None:
-        bounded += shrinkage.names
+    bounded = (prior.absent if prior else ()) + (shrinkage.names if shrinkage else ())
     known = examine(shared.names, beta, S, moved, bounded)
     covariance, quantile, freedom = known.covariance, NORMAL, samples
     intervals: Intervals = "likelihood"
     if coloured:
-        each: Sequence[LogInformation] = logs
-        if repeats:
-            each = merged(logs, repeats)
-        repeated = None
+        each = merged(logs, repeats) if repeats else logs
+        repeated = []
         if len(each) >= FEWEST_LOGS:
-            repeated = jackknife(each, left_out(shared, each, beta, prior))
-        intervals = "sandwich" if repeated is None else "jackknife"
-        kinds, known_before = scatters(shared, each, beta), precision_of(prior, shared)
+            repeated = [jackknife(each, left_out(shared, each, beta, prior))]
+        intervals = "jackknife" if repeated else "sandwich"
+        kinds, (_, _, before) = scatters(shared, each, beta), likelihood(shared, (), beta, prior)
         meat, freedom = sandwich(kinds)
-        if shrinkage is not None:
-            meats = [np.sum([kind.among(_PRIOR_LOGS) for kind in kinds], axis=0), meat]
-            inverse = scaled_pinv(S)
-            ways = [inverse @ (one + known_before) @ inverse for one in meats]
-            if repeated is not None:
-                ways.insert(0, repeated + inverse @ known_before @ inverse)
-            covariance, quantile = np.mean(ways, axis=0), OF_FEW
+        inverse = scaled_pinv(S) if shrinkage else known.covariance
+        of_prior, covariance = inverse @ before @ inverse, inverse @ (meat + before) @ inverse
+        if shrinkage:
+            among = np.sum([kind.among(_PRIOR_LOGS) for kind in kinds], axis=0)
+            moves = [inverse @ among @ inverse, *repeated]
+            covariance = np.mean([covariance, *(of_prior + one for one in moves)], axis=0)
+            quantile = OF_FEW
         else:
-            covariance = known.covariance @ (meat + known_before) @ known.covariance
             if estimator == "refined":
                 # The long-run variance of a short log errs low: white noise is the least there is.
                 covariance = widened(covariance, known.covariance)
-            squares = float(freedom)
-            if repeated is not None:
-                within, covariance = covariance, widened(covariance, repeated)
-                squares = _satterthwaite(within, covariance, freedom, each)
-            quantile = student_quantile(squares)  # squares are two at least
+            within = covariance
+            for one in repeated:
+                covariance = widened(covariance, one)
+            quantile = student_quantile(_satterthwaite(within, covariance, freedom, each))
     return Fit(
         estimator=estimator,
         shared=shared,
@@ -315,7 +301,7 @@ def finish(
         intervals=intervals,
         quantile=quantile,
         freedom=freedom,
-        status=tuple(_STATUS[determined] for determined in known.determined),
+        status=tuple("OK" if determined else "NOT_IDENTIFIABLE" for determined in known.determined),
         unidentifiable=known.left_open,
         logs=tuple(logs),
         prior=prior,
@@ -391,13 +377,12 @@ def _satterthwaite(
 
     The rest has as many as there are logs of each kind, less one.
     """
-    known = np.diag(wide) > 0
+    part, whole = np.diag(within), np.diag(wide)
     share = 0.0
-    if known.any():
-        share = float(np.mean(1 - np.diag(within)[known] / np.diag(wide)[known]))
-    kinds = {log.loaded for log in logs}
-    repeats = len(logs) - len(kinds)
-    return float(1 / (share**2 / max(1, repeats) + (1 - share) ** 2 / max(1, freedom)))
+    if np.any(whole > 0):
+        share = float(np.mean(1 - part[whole > 0] / whole[whole > 0]))
+    repeats = len(logs) - len({log.loaded for log in logs})
+    return 1 / (share**2 / max(1, repeats) + (1 - share) ** 2 / max(1, freedom))
 
 
 def widened(robust: FloatArray, least: FloatArray) -> FloatArray:
@@ -442,16 +427,13 @@ def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> dic
     places, times, rows = [], [], []
     for number, log in enumerate(fit.logs):
         count = max(2, round(moments * durations[number] / sum(durations)))
-        ends = np.unique(np.linspace(0, log.S.shape[0], count + 1).astype(int))[1:]
         S, g = np.cumsum(log.S, axis=0), np.cumsum(log.g, axis=0)
+        ends = np.unique(np.linspace(0, len(S), count + 1).astype(int))[1:]
         for end in ends:
-            so_far = [
-                *fit.logs[:number],
-                LogInformation(log.loaded, log.c0, S[end - 1 : end], g[end - 1 : end]),
-            ]
-            beta, std = _estimate(fit, so_far)
+            own = replace(log, S=S[end - 1 : end], g=g[end - 1 : end])
+            beta, std = _estimate(fit, [*fit.logs[:number], own])
             places.append(number)
-            times.append(durations[number] * end / log.S.shape[0])
+            times.append(durations[number] * end / len(S))
             rows.append(np.concatenate([beta, fit.quantile * widening * std]))
     names = (*fit.names, *(f"{name}_half" for name in fit.names))
     columns = {"log": np.array(places, dtype=np.int32), "t": np.array(times)}
@@ -469,8 +451,7 @@ def _estimate(fit: Fit, logs: Sequence[LogInformation]) -> tuple[FloatArray, Flo
     known = examine(fit.names, beta, S, fit.moved, fit.absent)
     std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
     # the fit may know better than its sums
-    lost = np.array([status == "NOT_IDENTIFIABLE" for status in fit.status])
-    determined = np.array(known.determined) & ~lost
+    determined = np.array(known.determined) & np.isfinite(fit.std)
     return np.where(determined, beta, np.nan), np.where(determined, std, np.nan)
 
 

@@ -43,7 +43,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import groupby
 from math import ceil
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,8 +63,7 @@ from algid.estimators.fit import Fit, finish
 from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem, Source, WeakSettings
-from algid.model import Model, advanced, inertia
-from algid.signals.filters import correlate, differentiator, half_length, smoother
+from algid.model import DELAYS, Model, advanced, inertia
 from algid.signals.segments import Segment
 
 _ROUNDS = 4
@@ -101,7 +102,7 @@ def fit(problem: Problem, start: Fit | None = None) -> Fit:
     if shared.delay:
         problem = problem.at(shared.model, start.delay, estimate_delay=True)
     following = followed(problem)
-    beta, logs = start.values, None
+    beta = start.values
     for _ in range(_ROUNDS):
         logs = evidence(problem, shared, beta, following)
         if not logs:
@@ -110,7 +111,6 @@ def fit(problem: Problem, start: Fit | None = None) -> Fit:
         beta, S, _ = combine(shared, logs, before, problem.prior)
         if float((beta - before) @ S @ (beta - before)) < SETTLED_SIMULATED**2:
             break
-    assert logs is not None
     return finish("instruments", shared, logs, beta, start.moved, problem.prior, coloured=True)
 
 
@@ -119,21 +119,20 @@ def evidence(
     shared: Shared,
     beta: FloatArray,
     following: Explained | None = None,
-) -> list[LogInformation] | None:
+) -> list[LogInformation]:
     """Each log's likelihood projected on instruments, simulated at shared parameters `beta` (Q,).
 
     Where it is known how the arm is `following` a reference, the motion that this explains stands
-    in place of a simulated one. Rows weigh by their residual at `beta`. None where the parameters
-    move no arm, or most windows cannot be simulated. The windows of many pieces are simulated side
-    by side: a step costs the same for few as for many.
+    in place of a simulated one. Rows weigh by their residual at `beta`. Nothing where the
+    parameters move no arm, or most windows cannot be simulated. The windows of many pieces are
+    simulated side by side: a step costs the same for few as for many.
     """
     logs, settings = [], problem.settings
     model, delay = settings.model, settings.estimate_delay
     for kind, sources in problem.kinds():
         c0 = shared.coefficients(beta, kind)
-        c = c0.copy()
-        if shared.delay:
-            c[-1] -= settings.shift.delay  # the windows are shifted by it: the column is a change's
+        # the windows are shifted by the delay: the column is a change's
+        c = c0 - settings.shift.delay * np.isin(shared.log_names, DELAYS)
         linear = c[: len(model.names)]
         grams = [BlockSums() for _ in sources]
         rows, lost = np.zeros((2, len(grams)), dtype=np.int64)
@@ -144,16 +143,13 @@ def evidence(
             ):
                 X = windows.equations(model, piece, delay, linear)[:, :, ::_STRIDE]
                 Z = own.equations(model, motion, delay, linear)[:, :-1, ::step]
-                used = good
-                if settings.rest is not None:  # a joint that stands
-                    least = np.square(settings.rest)[:, None]
-                    used = good & (windows.square_speeds(piece)[:, ::_STRIDE] >= least)
-                both = np.where(used[..., None, :], np.concatenate([Z, X], axis=1), 0.0)
+                used = good & windows.moving(piece, settings.rest)[:, ::_STRIDE]
+                both = np.where(used[:, None], np.concatenate([Z, X], axis=1), 0.0)
                 rows[number] += good.size
                 lost[number] += np.sum(~good)
                 grams[number].add(weak.grams(both, OVERLAP // _STRIDE))
         if np.any(lost > _FEWEST * rows):
-            return None
+            return []
         for sums, count in zip(grams, (rows - lost).tolist(), strict=True):
             if count:
                 log = weak.evidence(sums.values(), count, c, kind, every=_STRIDE)
@@ -167,21 +163,17 @@ _Piece = tuple[int, Segment, Windows]
 
 def _batches(sources: Sequence[Source], settings: WeakSettings) -> Iterator[list[_Piece]]:
     """Pieces with whole windows, those together that are alike and have not too many samples."""
-    batch: list[_Piece] = []
-    samples = 0
-    for number, source in enumerate(sources):
-        for piece, windows, _ in weak.overlapping(source(), settings):
-            if (len(piece) - 2 * windows.margin) // windows.step < OVERLAP:
-                continue
-            if batch and (
-                samples + len(piece) > _TOGETHER or _steps(windows) != _steps(batch[0][2])
-            ):
-                yield batch
-                batch, samples = [], 0
-            batch.append((number, piece, windows))
-            samples += len(piece)
-    if batch:
-        yield batch
+
+    def placed() -> Iterator[tuple[tuple[int, int], _Piece]]:
+        samples = 0
+        for number, source in enumerate(sources):
+            for piece, windows in weak.overlapping(source(), settings):
+                if windows.count(piece):
+                    samples += len(piece)
+                    yield (_steps(windows), samples // _TOGETHER), (number, piece, windows)
+
+    for _, batch in groupby(placed(), itemgetter(0)):
+        yield [piece for _, piece in batch]
 
 
 def _steps(windows: Windows) -> int:
@@ -201,19 +193,19 @@ def _driven(batch: Sequence[_Piece], model: Model, c: FloatArray) -> Iterator[_M
     periods = [OVERLAP * windows.step * windows.dt / steps for _, _, windows in batch]
     states, good = simulated(model, c, np.repeat(periods, counts), start, acts)
     signals = np.concatenate([states, acts[:-1:2]], axis=1)
-    for h, last, count in zip(periods, np.cumsum(counts).tolist(), counts, strict=True):
-        own = slice(last - count, last)
-        rows = np.moveaxis(signals[..., own], 0, -1).reshape(6, -1)  # window by window
+    ends = np.cumsum(counts)[:-1]
+    parts = np.split(signals, ends, axis=-1), np.split(good, ends)
+    for h, part, own in zip(periods, *parts, strict=True):
+        rows = np.moveaxis(part, 0, -1).reshape(6, -1)  # window by window
         motion = Segment(0.0, h, rows[:2], rows[4:], rows[2:4])
-        yield Windows(h, steps * h, 0.0, None), motion, OVERLAP, good[own]
+        yield Windows(h, steps * h, 0.0, None), motion, OVERLAP, own
 
 
 def _explained(following: Explained, batch: Sequence[_Piece]) -> Iterator[_Motion]:
     """What the reference explains of each piece; of one without, no window is good."""
     for _, piece, windows in batch:
         motion = following(piece)
-        count = (len(piece) - 2 * windows.margin) // windows.step - OVERLAP
-        good = np.full(count // _STRIDE + 1, motion is not None)
+        good = np.full(-(-windows.count(piece) // _STRIDE), motion is not None)
         yield windows, motion or piece, _STRIDE, good
 
 
@@ -224,22 +216,14 @@ def cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray]:
     -------
     Angles and velocities (4, R) at their starts, and torques (2 K + 1, 2, R) at each half step
     """
-    length, margin, steps = OVERLAP * windows.step, windows.margin, _steps(windows)
-    starts = margin + np.arange(
-        0, len(piece) - 2 * margin - length + 1, windows.step * _STRIDE, dtype=np.int64
-    )
-    instants = starts + length / (2 * steps) * np.arange(2 * steps + 1)[:, None]
-    late, samples = windows.shift / windows.dt, np.arange(len(piece))
-    acts = np.stack([np.interp(instants - late, samples, tau) for tau in piece.tau], axis=1)
-    if windows.bandwidth is None:
-        assert piece.omega is not None  # `Windows.equations` has asked for it
-        return np.concatenate([piece.theta, piece.omega])[:, starts], acts
-    reach = half_length(piece.dt, windows.bandwidth)
-    start = [
-        correlate(piece.theta, kernel(piece.dt, windows.bandwidth))[:, starts - reach]
-        for kernel in (smoother, differentiator)
-    ]
-    return np.concatenate(start), acts
+    starts = windows.step * np.arange(0, windows.count(piece), _STRIDE)
+    length, steps = OVERLAP * windows.step, _steps(windows)
+    late = windows.shift / windows.dt - windows.margin
+    instants = starts + length / (2 * steps) * np.arange(2 * steps + 1)[:, None] - late
+    samples = np.arange(len(piece))
+    acts = np.stack([np.interp(instants, samples, tau) for tau in piece.tau], axis=1)
+    states = np.concatenate([windows.angles(piece), windows.velocities(piece)])
+    return states[:, starts], acts
 
 
 def simulated(
@@ -291,20 +275,20 @@ has none."""
 
 def followed(problem: Problem) -> Explained | None:
     """How the arm follows the references of its logs; None where one has none, or it does not."""
-    gram = None
+    gram: FloatArray = np.zeros(())
     for source in problem.logs:
         known = False
-        for piece, _, _ in weak.overlapping(source(), problem.settings):
+        for piece, _ in weak.overlapping(source(), problem.settings):
             if piece.reference is None:
                 return None
             F = _features(piece)
             if F is not None:
                 rows = np.concatenate([F, piece.theta, piece.tau])
-                gram = rows @ rows.T + (0.0 if gram is None else gram)
+                gram = gram + rows @ rows.T
                 known = True
         if not known:
             return None
-    if gram is None:
+    if not gram.shape:  # there is no log
         return None
     m = len(gram) - 4
     B = gram[m:, :m] @ scaled_pinv(gram[:m, :m], _TOLERANCE)

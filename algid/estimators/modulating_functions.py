@@ -28,8 +28,9 @@ from functools import cache, cached_property, lru_cache
 
 import numpy as np
 from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
 
-from algid.arm import FloatArray
+from algid.arm import FloatArray, read_only
 from algid.estimators.elastic import flexed, turns
 from algid.model import (
     Model,
@@ -44,7 +45,7 @@ from algid.model import (
     smooth_sign,
 )
 from algid.physics.signals import WIDTHS, Expression, Product, Values
-from algid.signals.filters import correlate, differentiator, half_length
+from algid.signals.filters import correlate, differentiator, half_length, smoother
 from algid.signals.segments import Segment
 
 OVERLAP = 8
@@ -52,6 +53,8 @@ _WINDOW = Polynomial([0, 1]) ** 4 * Polynomial([1, -1]) ** 4
 _FLEXED = 1e-4  # rad: by how much links are turned for differences
 _WINDOW_INTEGRAL = 1 / 630  # Beta(5, 5)
 
+Rest = tuple[float, float]
+"""Speeds of the joints in rad/s, RMS over a window, below which one stands."""
 Known = dict[Hashable, FloatArray]
 """Cached moments and velocities of one piece, of those that stay valid for another model."""
 
@@ -95,43 +98,29 @@ class Windows:
         """Samples that consecutive pieces must share, so that no window is lost between them."""
         return 2 * self.margin + (OVERLAP - 1) * self.step
 
-    def kernels(self, offset: float = 0.0) -> FloatArray:
-        """φ, φ' and φ'' at the samples plus `offset` samples, times dt: weights of a quadrature.
+    def count(self, piece: Segment) -> int:
+        """R: how many whole windows a piece holds."""
+        return max(0, (len(piece) - 2 * self.margin) // self.step - OVERLAP + 1)
 
-        Returns
-        -------
-        (3, L), in 1, 1/s and 1/s²
-        """
-        return _kernels(OVERLAP * self.step, self.dt, offset)
-
-    @cached_property
-    def _plain(self) -> FloatArray:
-        return self.kernels()
-
-    @cached_property
-    def _shifted(self) -> FloatArray:
-        return self.kernels(self.shift / self.dt - self.whole)
-
-    def moments(self, signals: FloatArray, kernel: FloatArray) -> FloatArray:
-        """Integrals of a kernel times each signal, window by window.
+    def moments(self, signals: FloatArray, order: int = 0, late: float = 0.0) -> FloatArray:
+        """Integrals of φ, φ' or φ'' times each signal, window by window.
 
         Parameters
         ----------
         signals : (m, n), unit u
-        kernel : (L,), of `kernels`
+        order : of the derivative, 0 … 2
+        late : samples by which the signals come later than the windows
 
         Returns
         -------
-        (m, R), with R = n // h - `OVERLAP` + 1 whole windows, unit u times the kernel's
+        (m, R), with R = n // h - `OVERLAP` + 1 whole windows, unit u over s^`order`
         """
+        kernel = _kernels(OVERLAP * self.step, self.dt, late)[order]
         rows = signals.shape[1] // self.step
         blocks = signals[:, : rows * self.step].reshape(signals.shape[0], rows, self.step)
         parts = kernel.reshape(OVERLAP, self.step) @ blocks.swapaxes(1, 2)
-        wanted = rows - OVERLAP + 1
-        result = np.zeros((signals.shape[0], wanted))
-        for part in range(OVERLAP):
-            result += parts[:, part, part : part + wanted]
-        return result
+        ends = range(rows - OVERLAP + 1, rows + 1)
+        return np.sum([parts[:, part, part:end] for part, end in enumerate(ends)], axis=0)
 
     def equations(
         self,
@@ -170,49 +159,43 @@ class Windows:
         of friction by load are nothing. The load is that of `at` (a fixed point, not a
         derivative): least squares settles in a few rounds.
         """
-        size = len(model.names) + delay + 1
-        margin = self.margin
-        if (len(piece) - 2 * margin) // self.step < OVERLAP:
-            return np.zeros((2, size, 0))
-        here = np.zeros(len(model.names)) if at is None else at
+        q, count = len(model.names), self.count(piece)
+        X = np.zeros((2, q + delay + 1, count))
+        if not count:
+            return X
+        here = np.zeros(q) if at is None else at
         known = {} if known is None else known
-        tau = self._acting(piece.tau)
-        theta = piece.theta[:, margin : len(piece) - margin]
-        X = np.zeros((2, size, (len(piece) - 2 * margin) // self.step - OVERLAP + 1))
+        theta = piece.theta[:, self.margin : len(piece) - self.margin]
         speed = (self._own, "velocity")  # a change of friction's width asks for it again
 
         def motion() -> Motion:
-            omega = known[speed] = known[speed] if speed in known else self._velocity(piece)
+            omega = known[speed] = known[speed] if speed in known else self.velocities(piece)
             return Motion(theta, omega, omega)
 
-        self._fill(X, model, motion, theta.shape[1], known)
-        bends = None
+        X[:, :q] = self.columns(model, theta.shape[1], motion, known)
+        # with the derivative J at c0 of Y c0, τ = Y c0 + J (c - c0) is J c = τ + (J - Y) c0
+        more: FloatArray = np.zeros((2, q, count))  # J - Y
         if at is not None and acting(model, "elastic"):
-            bends = self._bend(X, model, at, motion(), tau)
+            more = self._bend(X, model, at, motion(), self._acting(piece.tau))
         for share, whole in acting(model, "of_motor"):
             X[:, share] = here[whole] * (X[:, share] - X[:, whole])
-            if bends is not None:
-                bends[:, whole] += here[share] / (here[whole] or 1.0) * X[:, share]
+            more[:, whole] += here[share] / (here[whole] or 1.0) * X[:, share]
         if at is not None and acting(model, "by_load"):
-            omega = motion().omega
-            L = load(model, at, Motion(theta, omega, np.gradient(omega, self.dt, axis=1)))
+            accelerated = self._accelerated(motion())
+            L = load(model, at, accelerated)
+            moments = self.moments(np.abs(L) * smooth_sign(model, accelerated.omega))
             for place, joint in acting(model, "by_load"):
-                dissipated = np.abs(L[joint]) * smooth_sign(model, omega[joint])
-                X[joint, place] = self.moments(dissipated[None], self._plain[0])[0]
+                X[joint, place] = moments[joint]
         X *= gains(model, here)[:, None, None]
-        X[:, -1] = self._of_torque(tau, 0, known)
-        if at is not None:
-            _linearise_bilinear(X, model, at)
-        if at is not None and bends is not None:
-            bends *= gains(model, at)[:, None, None]
-            X[:, : len(at)] += bends
-            X[:, -1] += np.einsum("j,ajr->ar", at, bends)
-        slope = delay or model.lag_name is not None
-        tau_slope = self._of_torque(tau, 1, known) if slope else 0.0
+        more *= gains(model, here)[:, None, None]
+        for place, joint in acting(model, "gains"):
+            more[joint, place] += X[joint, :q].T @ here / gains(model, here)[joint]
+        X[:, :q] += more
+        X[:, -1] = self._of_torque(piece, 0, known) + np.einsum("j,ajr->ar", here, more)
         if model.lag_name is not None:
-            X[:, model.names.index(model.lag_name)] = tau_slope
+            X[:, model.names.index(model.lag_name)] = self._of_torque(piece, 1, known)
         if delay:
-            X[:, -2] = -tau_slope
+            X[:, -2] = -self._of_torque(piece, 1, known)
         return X
 
     def beside(
@@ -220,17 +203,14 @@ class Windows:
     ) -> FloatArray:
         """Moments (2, m, R) of what is `made` of torques and motion of a piece with a window."""
         theta = piece.theta[:, self.margin : len(piece) - self.margin]
-        omega = self._velocity(piece)
-        motion = Motion(theta, omega, np.gradient(omega, self.dt, axis=1))
+        omega = self.velocities(piece)
+        motion = self._accelerated(Motion(theta, omega, omega))
         rows = np.stack(made(self._acting(piece.tau), motion), axis=1)
-        return np.stack([self.moments(own, self._plain[0]) for own in rows])
+        return np.stack([self.moments(own) for own in rows])
 
-    def columns(self, model: Model, motion: Motion) -> FloatArray:
-        """Moments (2, q, R) of the model's columns along a motion with velocities, by windows."""
-        samples = motion.theta.shape[1]
-        X = np.zeros((2, len(model.names), samples // self.step - OVERLAP + 1))
-        self._fill(X, model, lambda: motion, samples, {})
-        return X
+    def _accelerated(self, motion: Motion) -> Motion:
+        """The motion with the accelerations that its velocities have."""
+        return replace(motion, alpha=np.gradient(motion.omega, self.dt, axis=1))
 
     def _bend(
         self,
@@ -245,20 +225,23 @@ class Windows:
         It is found by differences, so that moments need no derivative of the load's rate. The
         links' columns of X get the links' own motion.
         """
-        own, links_own = list(inertial(model)), apart(model, c)[list(inertial(model))]
+        own = list(inertial(model))
+
+        def columns(links: Motion) -> FloatArray:
+            return self.columns(model, tau.shape[1], lambda: links, {})[:, own]
+
         late = np.arange(tau.shape[1]) - (self.shift / self.dt - self.whole)
         acting = np.stack([np.interp(late, np.arange(tau.shape[1]), row) for row in tau])
-        alpha = np.gradient(motion.omega, self.dt, axis=1)
-        motion = flexed(model, c, replace(motion, alpha=alpha), self.dt, acting)
+        motion = flexed(model, c, self._accelerated(motion), self.dt, acting)
         links = link_motion(model, c, motion)
-        X[:, own] = self.columns(model, links)[:, own]
+        X[:, own] = columns(links)
         bends = np.zeros((2, len(c), X.shape[2]))
         J = sensitivity(model, c, motion)
         for place, turn in turns(model, c, motion, J, self.dt):
             step = _FLEXED / max(float(np.abs(turn[0]).max()), 1e-300)
             theta, omega = links.theta + step * turn[0], links.omega + step * turn[1]
-            moved = self.columns(model, Motion(theta, omega, omega))[:, own] - X[:, own]
-            bends[:, place] += np.einsum("aqr,q->ar", moved, links_own) / step
+            moved = columns(Motion(theta, omega, omega)) - X[:, own]
+            bends[:, place] += np.einsum("aqr,q->ar", moved, apart(model, c)[own]) / step
         return bends
 
     def _acting(self, torques: FloatArray) -> FloatArray:
@@ -266,27 +249,26 @@ class Windows:
         first = self.margin - self.whole
         return torques[:, first : torques.shape[1] - self.margin - self.whole]
 
-    def torque_moments(self, torques: FloatArray) -> FloatArray:
-        """Integrals (m, R) of φ times torques (m, N) of a piece that holds a window."""
-        return self.moments(self._acting(torques), self._shifted[0])
+    def torque_moments(self, torques: FloatArray, order: int = 0) -> FloatArray:
+        """Integrals (m, R) of φ or φ' times torques (m, N) of a piece that holds a window."""
+        return self.moments(self._acting(torques), order, self.shift / self.dt - self.whole)
 
-    def _of_torque(self, tau: FloatArray, order: int, known: Known) -> FloatArray:
-        """Moments (2, R) of the torques (2, n) by φ or φ', as late as they act."""
+    def _of_torque(self, piece: Segment, order: int, known: Known) -> FloatArray:
+        """Moments (2, R) of the piece's torques by φ or φ', as late as they act."""
         key = (self._own, self.shift, order)
         if key not in known:
-            known[key] = self.moments(tau, self._shifted[order])
+            known[key] = self.torque_moments(piece.tau, order)
         return known[key]
 
-    def _fill(
-        self,
-        X: FloatArray,
-        model: Model,
-        motion: Callable[[], Motion],
-        samples: int,
-        known: Known,
-    ) -> None:
-        """Write moments of the columns of τ = d²s/dt² + dp/dt + f to X: ∫φ″ s - ∫φ′ p + ∫φ f."""
+    def columns(
+        self, model: Model, samples: int, motion: Callable[[], Motion], known: Known
+    ) -> FloatArray:
+        """Moments (2, q, R) of the columns of τ = d²s/dt² + dp/dt + f: ∫φ″ s - ∫φ′ p + ∫φ f.
+
+        Along a `motion` of so many samples, made where moments are not `known`.
+        """
         own = self._own
+        X = np.zeros((2, len(model.names), samples // self.step - OVERLAP + 1))
 
         def key(order: int, product: Product) -> Hashable:
             widths = tuple(getattr(model, name) for name in _widths(product))
@@ -301,7 +283,7 @@ class Windows:
                 signals = np.empty((len(missing), samples))
                 for signal, product in zip(signals, missing, strict=True):
                     signal[:] = values.of(product)
-                moments = self.moments(signals, self._plain[order])
+                moments = self.moments(signals, order)
                 known.update(zip([key(order, one) for one in missing], moments, strict=True))
             for rows, weighted in zip(X, (one, two), strict=True):
                 for product, pairs in weighted.items():
@@ -309,24 +291,43 @@ class Windows:
                     moment = known[key(order, product)] if product else float(order == 0)
                     for place, factor in pairs:
                         rows[place] += (-1) ** order * factor * moment
+        return X
+
+    def moving(self, piece: Segment, rest: Rest | None) -> NDArray[np.bool_]:
+        """In which windows (2, R) a joint is no slower than its `rest`, if one is given."""
+        if rest is None:
+            return np.ones((2, self.count(piece)), dtype=bool)
+        return self.square_speeds(piece) >= np.square(rest)[:, None]
 
     def square_speeds(self, piece: Segment) -> FloatArray:
         """Each joint's squared velocity (2, R) in (rad/s)², averaged over `equations` windows."""
-        if (len(piece) - 2 * self.margin) // self.step < OVERLAP:
+        if not self.count(piece):
             return np.zeros((2, 0))
-        return self.moments(self._velocity(piece) ** 2, self._plain[0])
+        return self.moments(self.velocities(piece) ** 2)
 
-    def _velocity(self, piece: Segment) -> FloatArray:
-        inner = slice(self.margin, len(piece) - self.margin)
-        if self.bandwidth is None:
-            if piece.omega is None:
-                raise ValueError("the log has no velocities: give the differentiator's bandwidth")
-            return piece.omega[:, inner]
-        reach = half_length(self.dt, self.bandwidth)
-        kernel = differentiator(self.dt, self.bandwidth)
-        return correlate(
-            piece.theta[:, self.margin - reach : len(piece) - self.margin + reach], kernel
-        )
+    def velocities(self, piece: Segment) -> FloatArray:
+        """Velocities (2, n) where the piece's windows are: the log's own, or below the bandwidth.
+
+        Raises
+        ------
+        ValueError
+            If there are to be the log's own, and it has none.
+        """
+        if self.bandwidth is not None:
+            return self._passed(piece, differentiator(self.dt, self.bandwidth))
+        if piece.omega is None:
+            raise ValueError("the log has no velocities: give the differentiator's bandwidth")
+        return piece.omega[:, self.margin : len(piece) - self.margin]
+
+    def angles(self, piece: Segment) -> FloatArray:
+        """Angles (2, n) where the piece's windows are, below the bandwidth if there is one."""
+        if self.bandwidth is not None:
+            return self._passed(piece, smoother(self.dt, self.bandwidth))
+        return piece.theta[:, self.margin : len(piece) - self.margin]
+
+    def _passed(self, piece: Segment, kernel: FloatArray) -> FloatArray:
+        first = self.margin - kernel.size // 2
+        return correlate(piece.theta[:, first : len(piece) - first], kernel)
 
 
 @cache
@@ -338,15 +339,13 @@ def _widths(product: Product) -> list[str]:
 
 @lru_cache(maxsize=32)
 def _kernels(length: int, dt: float, offset: float) -> FloatArray:
+    """φ, φ' and φ'' (3, L) at the samples plus `offset` samples, times dt, in 1, 1/s and 1/s²."""
     s = np.clip((np.arange(length) + offset) / length, 0, 1)
-    span = length * dt
     window = _WINDOW / _WINDOW_INTEGRAL
-    kernels = np.stack([window(s), window.deriv()(s), window.deriv(2)(s)])
-    for order in range(3):
-        kernels[order] /= span ** (order + 1)
-    kernels *= dt
-    kernels.setflags(write=False)
-    return kernels
+    span = length * dt
+    return read_only(
+        np.stack([window.deriv(order)(s) * dt / span ** (order + 1) for order in range(3)])
+    )
 
 
 EPS = float(np.finfo(np.float64).eps)
@@ -362,7 +361,7 @@ def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> Floa
     ----------
     gram : (..., 2, m, m)
         Gram matrices of the columns by joint, the torque last; of several logs at once.
-    v : (m,) or (k, m), then the weights are (k, ..., 2)
+    v : (m,)
         What makes a residual of the columns: the coefficients with their sign turned, and 1 for
         the torque.
     rows : int or (..., 2)
@@ -376,10 +375,8 @@ def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> Floa
     the better it is solved the more it would weigh: its residual counts as `MOTORLESS` of the
     other's at least.
     """
-    V = np.atleast_2d(v).T
-    least = ROUNDINGS * EPS * np.sum(np.abs(V) * (np.abs(gram) @ np.abs(V)), axis=-2)
-    squares = np.moveaxis(np.maximum(np.sum(V * (gram @ V), axis=-2), least), -1, 0)
-    squares = squares.reshape(v.shape[:-1] + squares.shape[1:])
+    least = ROUNDINGS * EPS * (np.abs(gram) @ np.abs(v)) @ np.abs(v)
+    squares = np.maximum((gram @ v) @ v, least)
     driven = gram[..., -1, -1] > 0
     alone = np.sum(driven, axis=-1, keepdims=True) == 1
     each = np.where(driven, squares / np.maximum(rows, 1), 0.0)
@@ -387,16 +384,3 @@ def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> Floa
     squares = np.where(alone & ~driven, np.maximum(squares, of_motorless), squares)
     torque = gram[..., -1, -1].max(axis=-1, keepdims=True)
     return np.asarray(rows / np.maximum(squares, 1e-24 * torque + 1e-300))
-
-
-def _linearise_bilinear(X: FloatArray, model: Model, at: FloatArray) -> None:
-    """Complete X, made at `at`, by the gains' columns, and the torque by the linearisation's part.
-
-    With Y the regressor at c0 and J the derivative there, τ = Y c0 + J (c - c0) is J c = τ + (J -
-    Y) c0; J and Y differ in the columns of gains alone.
-    """
-    factor, moved = gains(model, at), []
-    for place, joint in acting(model, "gains"):
-        X[joint, place] = X[joint, : len(at)].T @ at / factor[joint]
-        moved.append(place)
-    X[:, -1] += np.einsum("j,ajr->ar", at[moved], X[:, moved])

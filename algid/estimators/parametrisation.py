@@ -18,22 +18,20 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray, payload_phasors
-from algid.base.names import names_in, outside
+from algid.base.names import names_in, outside, within
 from algid.model import DELAYS, PARAMETERS, SINE_OF, SINES, Model
 from algid.physics.parameters import BODY, PAYLOAD
 from algid.physics.terms.rigid import K1, K2
 
 BODY_PARAMETERS = names_in(BODY)
 PAYLOAD_PARAMETERS = names_in(PAYLOAD) + BODY_PARAMETERS
-# which z adds to which coefficient, and its part: the moments are phasors
-_LOADED: dict[str, tuple[int, str]] = {}
-for _name, _parameter in PARAMETERS.items():
-    if _parameter.payload is not None:
-        _LOADED[_name] = (_parameter.payload, "real")
-for _sine, _cosine in SINES.items():
-    _LOADED[_sine] = (_LOADED[_cosine][0], "imag")
+# which of z adds to which coefficient, by its place among real and imaginary parts in turn
+_LOADED = {name: 2 * one.payload for name, one in PARAMETERS.items() if one.payload is not None}
+_LOADED |= {sine: _LOADED[cosine] + 1 for sine, cosine in SINES.items()}
+_UPRIGHT = np.array([0, 0, 0, 1, 1])  # which of z turn with the arm: those of gravity
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +84,12 @@ class Shared:
 
     def turn(self, beta: FloatArray) -> tuple[float, FloatArray]:
         """Correction to add to θ1, arg K2 - arg K1 in rad; its derivative (q,) by coefficients."""
-        slope = np.zeros(len(self.log_names))
-        turn = 0.0
-        for cosine, sine, sign in self._phasors:
+        slope, turn = np.zeros(len(self.log_names)), 0.0
+        place = self.model.compiled.place
+        if SINE_OF.get(K2) not in place:
+            return turn, slope
+        for name, sign in ((K2, 1.0), (K1, -1.0)):
+            cosine, sine = place[name], place[SINE_OF[name]]
             K = complex(beta[cosine], beta[sine])
             turn += sign * float(np.angle(K))
             size = max(abs(K) ** 2, 1e-300)
@@ -96,25 +97,17 @@ class Shared:
             slope[sine] += sign * K.real / size
         return turn, slope
 
-    @cached_property
-    def _phasors(self) -> tuple[tuple[int, int, float], ...]:
-        """Places of both parts of K2 and K1 and their signs in the turn; () where one has none."""
-        place, places = self.model.compiled.place, []
-        for name, sign in ((K2, 1.0), (K1, -1.0)):
-            sine = SINE_OF.get(name, "")
-            if sine not in place or name not in place:
-                return ()
-            places.append((place[name], place[sine], sign))
-        return tuple(places)
+    def moments(self, beta: FloatArray) -> NDArray[np.complex128]:
+        """The payload's constants and phasors z (5,)."""
+        turn, _ = self.turn(beta)
+        return np.array(payload_phasors(*self.physical(beta), self.model.gravity, turn))
 
     def coefficients(self, beta: FloatArray, loaded: bool) -> FloatArray:
         """Coefficients c (q,) of a log."""
         c = beta[: len(self.log_names)].copy()
         if loaded:
-            turn, _ = self.turn(beta)
-            z = payload_phasors(*self.physical(beta), self.model.gravity, turn)
-            for row, (part, side) in self._rows:
-                c[row] += getattr(z[part], side)
+            rows, parts = self._loaded
+            c[rows] += self.moments(beta).view(np.float64)[parts]
         return c
 
     def jacobian(self, beta: FloatArray, loaded: bool) -> FloatArray:
@@ -122,11 +115,9 @@ class Shared:
         q, Q = len(self.log_names), len(self.names)
         T = np.eye(q, Q)
         if loaded:
-            turn, slope = self.turn(beta)
-            z = payload_phasors(*self.physical(beta), self.model.gravity, turn)
-            turned = (0.0, 0.0, 0.0, 1j * z[3], 1j * z[4])
-            for row, (part, side) in self._rows:
-                T[row, :q] += getattr(complex(turned[part]), side) * slope
+            (rows, parts), (_, slope) = self._loaded, self.turn(beta)
+            turned = 1j * self.moments(beta) * _UPRIGHT
+            T[rows, :q] += turned.view(np.float64)[parts, None] * slope
             # the payload's part is quadratic in each of its parameters: any step is exact
             for place in range(q, Q):
                 step = np.eye(1, Q, place)[0]
@@ -135,5 +126,7 @@ class Shared:
         return T
 
     @cached_property
-    def _rows(self) -> list[tuple[int, tuple[int, str]]]:
-        return [(row, _LOADED[name]) for row, name in enumerate(self.log_names) if name in _LOADED]
+    def _loaded(self) -> tuple[list[int], list[int]]:
+        """Places of the coefficients that a payload adds to, and of what it adds."""
+        names = within(self.log_names, _LOADED)
+        return list(map(self.log_names.index, names)), [_LOADED[name] for name in names]

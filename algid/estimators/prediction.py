@@ -78,7 +78,7 @@ class PredictionScore:
 
         Of a joint without torque over the other joint's.
         """
-        return np.sqrt(self.sums[3] / np.maximum(self._of_drive(self.sums[1]), 1e-300))
+        return self._beside(self._of_drive(self.sums[1]))
 
     @property
     def of_load(self) -> FloatArray:
@@ -87,8 +87,10 @@ class PredictionScore:
         A joint that is hardly driven has little torque, since inertia, weight and friction make up
         for one another there.
         """
-        acts = np.maximum(self._of_drive(self.sums[1]), self.sums[2])
-        return np.sqrt(self.sums[3] / np.maximum(acts, 1e-300))
+        return self._beside(np.maximum(self._of_drive(self.sums[1]), self.sums[2]))
+
+    def _beside(self, squares: FloatArray) -> FloatArray:
+        return np.sqrt(self.sums[3] / np.maximum(squares, 1e-300))
 
     @property
     def r2(self) -> FloatArray:
@@ -137,8 +139,8 @@ def sums_of(model: Model, c: FloatArray, X: FloatArray, omega: FloatArray) -> Fl
     still = np.abs(omega) < model.coulomb_speed
     held = np.abs(r)
     for joint, name in enumerate((F1, F2)):
-        if name in model.names:
-            place = model.names.index(name)
+        place = model.compiled.place.get(name)
+        if place is not None:
             f = max(float(c[place]), 0.0)
             held[joint] = np.maximum(np.abs(r[joint] + f * X[joint, place]) - f, 0.0)
     rows = [tau, tau**2, np.sum(parts**2, axis=1), r**2]
@@ -146,15 +148,15 @@ def sums_of(model: Model, c: FloatArray, X: FloatArray, omega: FloatArray) -> Fl
     return np.array([row.sum(axis=1) for row in rows])
 
 
-def _decimated(piece: Segment) -> tuple[FloatArray, float, float]:
-    """Angles and torques (4, n) at the filter's rate, the period in s, and the first time in s."""
+def _decimated(piece: Segment) -> Segment:
+    """Angles and torques at the filter's rate."""
     step = int(1 / (_PER_CUTOFF * MOTION * piece.dt))
-    signals = np.concatenate([piece.theta, piece.tau])
     kernel = smoother(piece.dt, _SHARPER * MOTION)
-    if step < 2 or signals.shape[1] < kernel.size:
-        return signals, piece.dt, piece.start
-    first = piece.start + piece.dt * (kernel.size // 2)
-    return correlate(signals, kernel, step), step * piece.dt, first
+    if step < 2 or len(piece) < kernel.size:
+        return piece
+    start = piece.start + piece.dt * (kernel.size // 2)
+    theta, tau = (correlate(signals, kernel, step) for signals in (piece.theta, piece.tau))
+    return Segment(start, step * piece.dt, theta, tau)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,41 +179,37 @@ def scored_torque(
     A piece that is too short to be scored is left out. See the module's table.
     """
     for piece in pieces(segments, lambda dt: round(_PIECE_SECONDS / dt)):
-        signals, dt, first = _decimated(piece)
+        thin = _decimated(piece)
+        dt, n = thin.dt, len(thin)
         edge = round(DROPPED / dt)
-        if signals.shape[1] <= max(2 * edge + 2, 6 * (ORDER + 1)):
+        if n <= max(2 * edge + 2, 6 * (ORDER + 1)):
             continue
-        theta = butterworth(signals[:2], dt, min(MOTION, 0.45 / dt))
-        motion = motion_of(theta, dt)
+        motion = motion_of(thin.theta, dt)
         Y = regressor(model, flexed(model, c, motion, dt), c)
         Y = np.concatenate([motion.omega[:, None], Y], axis=1)
         late = shift.at(piece.dt) - model.lag(c)
         if late:
-            place = np.arange(signals.shape[1]) + late / dt
-            whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
+            place = np.arange(n) + late / dt
+            whole = np.clip(np.floor(place).astype(np.int64), 0, n - 2)
             Y = Y[:, :, whole] + (place - whole) * (Y[:, :, whole + 1] - Y[:, :, whole])
-        X = np.concatenate([Y, signals[2:, None]], axis=1)
-        low = butterworth(X.reshape(-1, X.shape[2]), dt, min(CUTOFF, 0.45 / dt))
-        X = low.reshape(X.shape)[:, :, edge : signals.shape[1] - edge]
-        kept = np.arange(edge, signals.shape[1] - edge)
-        yield ScoredTorque(first + dt * kept, X[:, 1:], X[:, 0])
+        X = np.concatenate([Y, thin.tau[:, None]], axis=1)
+        low = butterworth(X.reshape(-1, n), dt, min(CUTOFF, 0.45 / dt))
+        kept = slice(edge, n - edge)
+        X = low.reshape(X.shape)[:, :, kept]
+        yield ScoredTorque(thin.t[kept], X[:, 1:], X[:, 0])
 
 
 def motion_of(theta: FloatArray, dt: float) -> Motion:
-    """Motion with derivatives by five points.
+    """Motion within its band, with derivatives by five points.
 
     The two samples at each end repeat their neighbour's.
     """
-    return Motion(theta, _by_five(theta, _SLOPE / dt), _by_five(theta, _BEND / dt**2))
-
-
-def _by_five(theta: FloatArray, weights: FloatArray) -> FloatArray:
-    """Sums (2, N) of the five samples around each one of angles (2, N), with `weights` (5,)."""
-    sums = np.empty(theta.shape)
-    for own, angle in zip(sums, theta, strict=True):
-        own[2:-2] = np.correlate(angle, weights)
-    sums[:, :2], sums[:, -2:] = sums[:, 2:3], sums[:, -3:-2]
-    return sums
+    theta = butterworth(theta, dt, min(MOTION, 0.45 / dt))
+    rates = []
+    for weights in (_SLOPE / dt, _BEND / dt**2):
+        inner = [np.correlate(angle, weights) for angle in theta]
+        rates.append(np.pad(inner, ((0, 0), (2, 2)), mode="edge"))
+    return Motion(theta, *rates)
 
 
 def score(
@@ -221,11 +219,11 @@ def score(
     shift: TorqueShift = AT_ONCE,
 ) -> PredictionScore:
     """How well the coefficients `c` (q,) predict a log's torque; see the module."""
-    total = PredictionScore()
-    for piece in scored_torque(model, c, segments, shift):
-        sums = sums_of(model, c, piece.X, piece.omega)
-        total += PredictionScore(float(piece.t.size), sums)
-    return total
+    every = [
+        PredictionScore(float(piece.t.size), sums_of(model, c, piece.X, piece.omega))
+        for piece in scored_torque(model, c, segments, shift)
+    ]
+    return sum(every, PredictionScore())
 
 
 def cross_validate(
@@ -246,8 +244,8 @@ def cross_validate(
     total = PredictionScore()
     columns = len(fit.shared.model.names)
     without = left_out(fit.shared, fit.logs, fit.values, fit.prior)
-    for place, (source, log) in enumerate(zip(sources, fit.logs, strict=True)):
-        c = fit.shared.coefficients(without[place], log.loaded)
+    for source, log, beta in zip(sources, fit.logs, without, strict=True):
+        c = fit.shared.coefficients(beta, log.loaded)
         delay = float(c[columns:].sum())
         total += score(fit.shared.model, c[:columns], source(), shift.later(delay))
     return total
@@ -265,17 +263,14 @@ _LONGEST, _SHORTEST = 2e-3, 1.25e-4  # s of a step
 class RolloutScore:
     """By horizon (H,): starts.
 
-    By horizon and joint (H, 2): squared errors, and squared distances moved, in rad².
+    Squares (2, H, 2) in rad², by horizon and joint: of errors, and of distances moved.
     """
 
     count: FloatArray = field(default_factory=lambda: np.zeros(len(HORIZONS)))
-    error: FloatArray = field(default_factory=lambda: np.zeros((len(HORIZONS), 2)))
-    moved: FloatArray = field(default_factory=lambda: np.zeros((len(HORIZONS), 2)))
+    squares: FloatArray = field(default_factory=lambda: np.zeros((2, len(HORIZONS), 2)))
 
     def __add__(self, other: RolloutScore) -> RolloutScore:
-        return RolloutScore(
-            self.count + other.count, self.error + other.error, self.moved + other.moved
-        )
+        return RolloutScore(self.count + other.count, self.squares + other.squares)
 
     @property
     def rmse(self) -> FloatArray:
@@ -283,15 +278,15 @@ class RolloutScore:
 
         NaN without a start, infinite where the simulation runs away.
         """
-        return self._root_mean(self.error)
+        return self._root_mean()[0]
 
     @property
     def distance(self) -> FloatArray:
         """RMS (H, 2) in rad of the joints' travel: the RMSE of an arm that stays where it is."""
-        return self._root_mean(self.moved)
+        return self._root_mean()[1]
 
-    def _root_mean(self, squares: FloatArray) -> FloatArray:
-        mean = squares / np.maximum(self.count, 1)[:, None]
+    def _root_mean(self) -> FloatArray:
+        mean = self.squares / np.maximum(self.count, 1)[:, None]
         return np.sqrt(np.where(self.count[:, None] > 0, mean, np.nan))
 
 
@@ -307,24 +302,16 @@ def rollouts(
     `shift` is the time in s after which a logged torque acts, as for `scored_torque`.
     """
     step = time_step(model, c)
-    spacing = max(_CLOSEST, duration / _STARTS)
-    made = []
-    for piece in pieces(segments, lambda dt: round(_PIECE_SECONDS / dt)):
-        starts = _starts(model, c, piece, spacing, step, shift)
-        if starts is not None:
-            made.append(starts)
+    made = list(_starts(segments, max(_CLOSEST, duration / _STARTS), step, shift, model.lag(c)))
     if not made:
         return RolloutScore()
     x, u, y = (np.concatenate(parts, axis=-1) for parts in zip(*made, strict=True))
-    angles = np.stack(_angles_at_horizons(model, c, x, u, step))
-    judged = np.isfinite(y[:, 0])
+    judged = np.isfinite(y)
     with np.errstate(over="ignore", invalid="ignore"):
-        error = np.where(judged[:, None], angles - y, 0.0)
-        moved = np.where(judged[:, None], y - x[:2], 0.0)
-        squares = np.where(np.isnan(error), np.inf, error) ** 2
-    return RolloutScore(
-        judged.sum(axis=1).astype(np.float64), squares.sum(axis=2), (moved**2).sum(axis=2)
-    )
+        off = np.stack([_angles_at_horizons(model, c, x, u, step) - y, y - x[:2]])
+        # an angle that is no number has run away
+        squares = np.where(judged, np.where(np.isnan(off), np.inf, off) ** 2, 0.0)
+    return RolloutScore(judged[:, 0].sum(axis=1).astype(np.float64), squares.sum(axis=3))
 
 
 def time_step(model: Model, c: FloatArray) -> float:
@@ -332,54 +319,43 @@ def time_step(model: Model, c: FloatArray) -> float:
 
     It divides the horizons.
     """
-    rate = stiffness(model, c)
+    around = np.linspace(0, 2 * np.pi, _POSES, endpoint=False)
+    (outer, coupling), (_, inner) = inertia(model, c, np.stack([np.zeros_like(around), around]))
+    rest = Motion(*np.zeros((3, 2, 1)))
+    slope = np.abs(partials(model, c, rest)[1, (0, 1), (0, 1), 0])
+    least = np.maximum(outer * inner - coupling**2, 1e-3 * outer * inner)
+    # in 1/s, at which friction stops a joint in its worst pose
+    rate = float(np.max(np.maximum(slope[0] * inner, slope[1] * outer) / least))
     step = _LONGEST
     while step * rate > 1 and step > _SHORTEST:
         step /= 2
     return step
 
 
-def stiffness(model: Model, c: FloatArray) -> float:
-    """The rate in 1/s at which friction stops either joint near rest, in its worst pose."""
-    around = np.linspace(0, 2 * np.pi, _POSES, endpoint=False)
-    (outer, coupling), (_, inner) = inertia(model, c, np.stack([np.zeros_like(around), around]))
-    rest = Motion(*np.zeros((3, 2, 1)))
-    slope = np.abs(partials(model, c, rest)[1, (0, 1), (0, 1), 0])
-    least = np.maximum(outer * inner - coupling**2, 1e-3 * outer * inner)
-    return float(np.max(np.maximum(slope[0] * inner, slope[1] * outer) / least))
-
-
 def _starts(
-    model: Model, c: FloatArray, piece: Segment, spacing: float, step: float, shift: TorqueShift
-) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """x, u and y of the starts in a piece of a log that have the first horizon ahead of them.
-
-    None where there is no such start.
-    """
-    dt, n = piece.dt, len(piece)
-    halves = 2 * round(HORIZONS[-1] / step) + 1
-    edge, first = round(DROPPED / dt), round(HORIZONS[0] / dt)
-    at = np.arange(edge, n - edge - first, max(1, round(spacing / dt)))
-    if n <= 6 * (ORDER + 1) or not at.size:
-        return None
-    motion = motion_of(butterworth(piece.theta, dt, min(MOTION, 0.45 / dt)), dt)
-    late = shift.at(dt) - model.lag(c)
-    when = at * dt + 0.5 * step * np.arange(halves)[:, None] - late
-    t = np.arange(n) * dt
-    u = np.empty((halves, 2, at.size))
-    ahead = at + np.array(HORIZONS)[:, None] / dt
-    y = np.empty((len(HORIZONS), 2, at.size))
-    for joint in range(2):
-        u[:, joint] = np.interp(when, t, piece.tau[joint])
-        y[:, joint] = np.interp(ahead, np.arange(n), motion.theta[joint])
-    y[np.broadcast_to((ahead > n - 1 - edge)[:, None], y.shape)] = np.nan
-    return np.concatenate([motion.theta[:, at], motion.omega[:, at]]), u, y
+    segments: Iterable[Segment], spacing: float, step: float, shift: TorqueShift, lag: float
+) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    """x, u and y of the starts in a log that have the first horizon ahead of them, by pieces."""
+    for piece in pieces(segments, lambda dt: round(_PIECE_SECONDS / dt)):
+        dt, n = piece.dt, len(piece)
+        edge, first = round(DROPPED / dt), round(HORIZONS[0] / dt)
+        at = np.arange(edge, n - edge - first, max(1, round(spacing / dt)))
+        if n <= 6 * (ORDER + 1) or not at.size:
+            continue
+        motion, t = motion_of(piece.theta, dt), np.arange(n)
+        halves = 0.5 * step / dt * np.arange(2 * round(HORIZONS[-1] / step) + 1)
+        when = at + halves[:, None] - (shift.at(dt) - lag) / dt
+        ahead = at + np.array(HORIZONS)[:, None] / dt
+        u = np.stack([np.interp(when, t, tau) for tau in piece.tau], axis=1)
+        y = np.stack([np.interp(ahead, t, theta) for theta in motion.theta], axis=1)
+        y = np.where(ahead[:, None] > n - 1 - edge, np.nan, y)
+        yield np.concatenate([motion.theta[:, at], motion.omega[:, at]]), u, y
 
 
 def _angles_at_horizons(
     model: Model, c: FloatArray, x: FloatArray, u: FloatArray, step: float
-) -> list[FloatArray]:
-    """Angles (2, S) at each horizon, by the classical Runge-Kutta method of fourth order."""
+) -> FloatArray:
+    """Angles (H, 2, S) at each horizon, by the classical Runge-Kutta method of fourth order."""
     angles: list[FloatArray] = []
     ends = [round(horizon / step) for horizon in HORIZONS]
     # an arm far from the log's may run away: its error is infinite then
@@ -388,4 +364,4 @@ def _angles_at_horizons(
             x = advanced(model, c, x, u[2 * number : 2 * number + 3], step)
             if number + 1 in ends:
                 angles.append(x[:2])
-    return angles
+    return np.stack(angles)

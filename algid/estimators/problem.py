@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from algid.base.progress import Progress
 from algid.estimators.combine import Prior
@@ -96,10 +95,6 @@ class Problem:
         for loaded, sources in ((False, self.unloaded), (True, self.loaded)):
             if sources:
                 yield loaded, sources
-
-    def but(self, **settings: Any) -> Problem:
-        """The same logs with other settings."""
-        return replace(self, settings=replace(self.settings, **settings))
 
     def at(self, model: Model, delay: float | None, *, estimate_delay: bool = False) -> Problem:
         """The same logs by the `model` and the `delay` in s, where there is one, of a fit."""

@@ -39,16 +39,17 @@ Groups = tuple[tuple[int, ...], ...]
 
 def grouped(unloaded: Sequence[Source], loaded: Sequence[Source]) -> Groups:
     """Groups of the unloaded and then the loaded logs, by their places in that order."""
-    groups: list[tuple[bool, FloatArray, list[int]]] = []  # kind, and the first log's motion
-    for place, source in enumerate([*unloaded, *loaded]):
-        kind, motion = place >= len(unloaded), _velocities(source)
-        for other, first, places in groups:
-            if other is kind and alike(first, motion):
-                places.append(place)
+    groups: list[list[int]] = []
+    motions = [_velocities(source) for source in (*unloaded, *loaded)]
+    for place, motion in enumerate(motions):
+        for group in groups:
+            same_kind = (group[0] < len(unloaded)) is (place < len(unloaded))
+            if same_kind and alike(motions[group[0]], motion):
+                group.append(place)
                 break
         else:
-            groups.append((kind, motion, [place]))
-    return tuple(tuple(places) for _, _, places in groups)
+            groups.append([place])
+    return tuple(map(tuple, groups))
 
 
 def shared_samples(logs: Sequence[FloatArray]) -> FloatArray:
@@ -99,11 +100,10 @@ def alike(one: FloatArray, other: FloatArray) -> bool:
     reach = min(round(_SHIFT * _RATE), count // 4)
     shifts = np.arange(-reach, reach + 1)  # steps that the second comes later
     padded = np.pad(other, ((0, 0), (reach, reach)))
-    products = np.zeros(shifts.size)
-    for own, others in zip(one, padded, strict=True):
-        products += np.correlate(others, own, "valid")
+    pairs = zip(padded, one, strict=True)
+    products = np.sum([np.correlate(others, own, "valid") for others, own in pairs], axis=0)
     power = np.sqrt(_overlapping(one, shifts) * _overlapping(other, -shifts))
-    return bool(np.any((power > 0) & (products > ALIKE * power)))
+    return bool(np.any(products > ALIKE * power))
 
 
 def _overlapping(velocities: FloatArray, shifts: NDArray[np.int64]) -> FloatArray:
@@ -111,10 +111,8 @@ def _overlapping(velocities: FloatArray, shifts: NDArray[np.int64]) -> FloatArra
 
     For shifts (L,) by which those come later.
     """
-    squares = np.sum(velocities**2, axis=0)
-    places = squares.size - 1 - np.abs(shifts)
-    at_start, at_end = np.cumsum(squares)[places], np.cumsum(squares[::-1])[places]
-    return np.where(shifts >= 0, at_start, at_end)
+    sums = np.append(0.0, np.cumsum(velocities**2, axis=1).sum(axis=0))
+    return sums[sums.size - 1 - np.maximum(shifts, 0)] - sums[np.maximum(-shifts, 0)]
 
 
 def _velocities(source: Source) -> FloatArray:
@@ -134,20 +132,15 @@ def _velocities(source: Source) -> FloatArray:
 
 def shared_out(logs: Sequence[LogInformation], groups: Groups) -> list[LogInformation]:
     """Each log's likelihood, divided by how many repeat its motion."""
-    shared = list(logs)
-    for group in groups:
-        for place in group:
-            log = logs[place]
-            shared[place] = replace(log, S=log.S / len(group), g=log.g / len(group))
-    return shared
+    repeats = {place: len(group) for group in groups for place in group}
+    return [log.scaled(1 / repeats[place]) for place, log in enumerate(logs)]
 
 
 def merged(logs: Sequence[LogInformation], groups: Groups) -> list[LogInformation]:
     """One likelihood for each group, the sum of those of its logs stretch by stretch."""
     sums = []
     for group in groups:
-        c0 = logs[group[0]].c0
-        own = [logs[place].about(c0) for place in group]
+        own = [logs[place].about(logs[group[0]].c0) for place in group]
         longest = max(own, key=lambda log: len(log.S))
         S, g = np.zeros_like(longest.S), np.zeros_like(longest.g)
         for log in own:

@@ -54,7 +54,7 @@ v       long-run variance of the products' sum, lag by lag              (L, 2)  
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -85,7 +85,7 @@ from algid.estimators.excitation import undriven
 from algid.estimators.fit import Fit, finish, solved_anew, widened
 from algid.estimators.instruments import Explained, followed
 from algid.estimators.misfit import of_no_term
-from algid.estimators.modulating_functions import Known, Windows
+from algid.estimators.modulating_functions import OVERLAP, Known, Windows
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
 from algid.estimators.repeats import Groups, grouped, merged, shared_out
@@ -187,25 +187,24 @@ class RobustProblem:
         """See `fit`."""
         settings, prior = problem.settings, problem.prior
         bare = replace(settings, model=replace(settings.model, terms=()), estimate_delay=False)
-        long_enough: dict[bool, list[Source]] = {False: [], True: []}
-        normals = []
-        for kind, sources in problem.kinds():
-            for source in sources:
-                normal = weak.normal_equations(source, bare)
-                if normal is not None:
-                    long_enough[kind].append(source)
-                    normals.append(normal)
+        normal_of = {source: weak.normal_equations(source, bare) for source in problem.logs}
+        normals = [normal for normal in normal_of.values() if normal is not None]
+        unloaded, loaded = (
+            [source for source in sources if normal_of[source] is not None]
+            for sources in (problem.unloaded, problem.loaded)
+        )
         delay = settings.estimate_delay or settings.shift.delay == 0
         model = replace(settings.model, terms=offered(normals, prior.names if prior else ()))
-        kept = replace(problem, unloaded=long_enough[False], loaded=long_enough[True])
-        rest = AT_REST * weak.speeds(kept.logs, settings)
-        ours = kept.but(model=model, estimate_delay=delay, rest=(float(rest[0]), float(rest[1])))
+        window = settings.window / OVERLAP
+        first, second = AT_REST * weak.speeds([*unloaded, *loaded], settings)
+        settings = replace(settings, model=model, estimate_delay=delay, rest=(first, second))
+        ours = replace(problem, unloaded=unloaded, loaded=loaded, settings=settings)
         return cls(
             ours,
             replace(ours.shared, payload=bool(problem.loaded)),
             np.max([normal.moved for normal in normals], axis=0, initial=0.0),
-            grouped(kept.unloaded, kept.loaded),
-            sum(normal.samples for normal in normals) <= _MOST_KEPT,
+            grouped(unloaded, loaded),
+            sum(window * normal.rows.max() / normal.dt for normal in normals) <= _MOST_KEPT,
         )
 
     def least_squares(
@@ -214,64 +213,41 @@ class RobustProblem:
         """Every term shrunk, by windows of `window` times the settings' length.
 
         Where asked for, `beside` torques that no term has.
+
+        Raises
+        ------
+        TooShortError
+            If a log has no such window.
         """
         shared, known, settings = self.shared, self.problem.prior, self.problem.settings
         model = replace(settings.model, by_torque=by_torque)
         settings = replace(settings, window=window * settings.window, model=model)
-        memory: list[dict[Hashable, Known] | None] = [None] * len(self.problem.logs)
+        memory: dict[Source, dict[Hashable, Known]] = {}
         if self.keeps:
-            memory = [{} for _ in memory]
-        normals = self._normals(settings, {}, memory)
-        first = normals[False] + normals[True]
-        solved = {kind: weak.solve(own, kind) for kind, own in normals.items() if own}
-        beta, _ = weak.first_estimate(shared, solved, known)
-        driven = {kind: _driven(own) for kind, own in normals.items()}
-        share: FloatArray = np.ones(0)
-        rounds = _SOFT_ROUNDS if acting(model, "elastic") else _ROUNDS
-        for number in range(rounds):
-            base = settings.shift.delay
-            if number:
-                columns = len(settings.model.names)
-                at = {
-                    kind: shared.coefficients(beta, kind)[:columns]
-                    for kind, own in normals.items()
-                    if own
-                }
-                if shared.delay:
-                    base = float(beta[columns])
-                    settings = settings.delayed(base)
-                normals = self._normals(settings, at, memory, beside=beside)
-            expected = expectation(shared, first, settings, beta, known)
-            if number == 0:
-                share = np.ones(len(expected.names))
-            logs = partial(self._weighed, normals, driven, base)
-            shrunk = partial(shrink, shared, expected, known)
-            (beta, share), weighed = weak.reweighted(logs, shrunk, (beta, share))
-        return self._finished("weak", weighed, beta, expected.prior(share))
-
-    def _normals(
-        self,
-        settings: WeakSettings,
-        at: Mapping[bool, FloatArray],
-        memory: Sequence[dict[Hashable, Known] | None],
-        *,
-        beside: bool = False,
-    ) -> dict[bool, list[Normal]]:
-        """Normal equations by kind `at` coefficients (q,), with shapes `beside` the model's."""
+            memory = {source: {} for source in self.problem.logs}
 
         def others(piece: Segment, windows: Windows) -> FloatArray:
-            return windows.beside(piece, partial(of_no_term, settings.model))
+            return windows.beside(piece, partial(of_no_term, model))
 
-        normals: dict[bool, list[Normal]] = {False: [], True: []}
-        for place, source in enumerate(self.problem.logs):
-            kind = place >= len(self.problem.unloaded)
-            normal = weak.normal_equations(
-                source, settings, at.get(kind), memory[place], others if beside else None
-            )
-            if normal is None:
+        share: FloatArray = np.ones(1)  # of every spread
+        columns, at = len(model.names), dict[bool, FloatArray]()
+        for _ in range(_SOFT_ROUNDS if acting(model, "elastic") else _ROUNDS):
+            besides = others if beside and at else None
+            normals = weak.normals_by_kind(self.problem, settings, at, besides, memory)
+            if len(weak.together(normals)) < len(self.problem.logs):
                 raise TooShortError(f"no {OF_A_WINDOW}")
-            normals[kind].append(normal)
-        return normals
+            if not at:
+                beta, _ = weak.first_estimate(shared, normals, known)
+                first = weak.together(normals)
+                driven = {kind: _driven(own) for kind, own in normals.items()}
+            expected = expectation(shared, first, settings, beta, known)
+            logs = partial(self._weighed, normals, driven, settings.shift.delay)
+            shrunk = partial(shrink, shared, expected, known)
+            (beta, share), weighed = weak.reweighted(logs, shrunk, (beta, share))
+            at = {kind: shared.coefficients(beta, kind)[:columns] for kind in normals}
+            if shared.delay:
+                settings = settings.delayed(float(beta[columns]))
+        return self._finished("weak", weighed, beta, expected.prior(share))
 
     def _weighed(
         self,
@@ -287,12 +263,8 @@ class RobustProblem:
         beta, _ = state
         logs = []
         for kind, own in normals.items():
-            if not own:  # without loaded logs there is no payload among the parameters
-                continue
             c0 = self.shared.coefficients(beta, kind)
-            c = c0.copy()
-            if self.shared.delay:
-                c[-1] -= base
+            c = c0 - base * np.isin(self.shared.log_names, DELAYS)
             for normal, counts in zip(own, driven[kind], strict=True):
                 wide = np.append(c, np.zeros(normal.gram.shape[-1] - 1 - c.size))
                 log = weak.evidence(normal.gram, normal.rows, wide, kind, used=counts)
@@ -303,7 +275,7 @@ class RobustProblem:
         """Each log's likelihood, shared among its repeats and divided by φ at `beta` (Q,)."""
         logs = shared_out(logs, self.groups)
         phi = dispersion(self.shared, merged(logs, self.groups), beta)
-        return [replace(log, S=log.S / phi, g=log.g / phi) for log in logs]
+        return [log.scaled(1 / phi) for log in logs]
 
     def _finished(
         self, estimator: str, logs: Sequence[LogInformation], beta: FloatArray, shrinkage: Prior
@@ -334,7 +306,7 @@ class RobustProblem:
         both joints: it moves all constants together, and no scatter from log to log or from window
         to window shows it.
         """
-        determined = np.array([status != "NOT_IDENTIFIABLE" for status in least.status])
+        determined = np.isfinite(least.std)
         moved, covariance = [], fit.covariance
         for settings in others:
             try:
@@ -346,9 +318,7 @@ class RobustProblem:
                 # near the hanging arm a spring is weight: least squares does not move then, but
                 # leaves open as much of the constant as the spring may be
                 covariance = widened(covariance, other.covariance)
-        if not moved:
-            return fit
-        scatter = np.transpose(moved) @ np.array(moved) / len(moved)
+        scatter = np.sum([np.outer(d, d) for d in moved], axis=0) / max(1, len(moved))
         return replace(fit, covariance=covariance + scatter)
 
     def instruments_if_endogenous(self, least: Fit) -> Fit:
@@ -385,7 +355,7 @@ class RobustProblem:
         delay = least.shared.delay
         problem = self.problem.at(least.shared.model, least.delay, estimate_delay=delay)
         logs = instruments.evidence(problem, self.shared, at, following)
-        if logs is None or len(logs) != len(least.logs) or least.shrinkage is None:
+        if len(logs) != len(least.logs) or least.shrinkage is None:
             return None
         return self._finished("instruments", self._divided(logs, at), at, least.shrinkage)
 
@@ -393,12 +363,11 @@ class RobustProblem:
 def _marginal(log: LogInformation, normal: Normal, q: int) -> LogInformation:
     """The likelihood of q coefficients, whatever those of the columns behind them are."""
     sizes = np.sqrt(np.diagonal(normal.gram.sum(axis=0), axis1=1, axis2=2))
-    sizes = sizes / np.sqrt(np.maximum(normal.rows, 1.0))[:, None]
     own, torque = sizes[:, q:-1], sizes[:, -1:]
     spread = BESIDE * np.sum(np.divide(torque, own, out=np.zeros_like(own), where=own > 0), axis=0)
-    S, _ = log.total
-    K = np.eye(spread.size) + spread[:, None] * S[q:, q:] * spread
-    Q = np.linalg.solve(K, spread[:, None] * S[q:, :q])
+    # in units of the spreads
+    S = log.total[0][q:] * spread[:, None]
+    Q = np.linalg.solve(np.eye(spread.size) + S[:, q:] * spread, S[:, :q])
     T = np.concatenate([np.eye(q), -spread[:, None] * Q])
     return replace(log, S=T.T @ log.S @ T + Q.T @ Q / len(log.S), g=log.g @ T)
 
@@ -412,7 +381,7 @@ def offered(normals: Sequence[Normal], held: Sequence[str] = ()) -> tuple[str, .
     terms = []
     for name, term in TERMS.items():
         free = term.spread is not None and not term.elastic and (driven or not term.gains)
-        if free or not set(term.names).isdisjoint(held):
+        if free or within(term.names, held):
             terms.append(name)
     return tuple(terms)
 
@@ -428,9 +397,8 @@ def _driven(normals: Sequence[Normal]) -> list[NDArray[np.bool_]]:
     constants near nothing: the better, the more it would weigh. An arm without its payload may need
     a fifth of the torque and is driven nevertheless.
     """
-    torques = [np.sqrt(normal.power / np.maximum(normal.rows, 1)) for normal in normals]
-    most = np.max(torques, axis=0, initial=0.0)
-    return [(torque >= _HARDLY * most) for torque in torques]
+    squares = np.array([normal.power / np.maximum(normal.rows, 1) for normal in normals])
+    return list(np.sqrt(squares) >= _HARDLY * np.sqrt(squares.max(axis=0)))
 
 
 def expectation(
@@ -450,22 +418,21 @@ def expectation(
     found = []
     for term in shared.model.terms + (DELAYS if shared.delay else ()):
         spread, mean = EVERY_TERM[term].spread, 0.0
+        if spread is None:
+            continue
         if term in DELAYS and not settings.shift.held:
             mean = 0.5 * normals[0].dt  # of a torque that a digital controller holds
         for name in outside(within(EVERY_TERM[term].names, shared.names), held):
-            if spread is None:
-                continue
-            unit = 1.0
-            if spread.of == "inertia":
-                unit = value[K3]
-            elif spread.of == "compliance":
-                unit = 1 / max(value[K3 if name.endswith("2") else K5], 1e-300)
-            elif spread.of == "torque":
-                unit = float(torque[int(name.endswith("2"))])
-            elif spread.of == "cosine":
-                unit = value[SINES[name]]
+            second = name.endswith("2")
+            units = {
+                "inertia": value[K3],
+                "compliance": 1 / max(value[K3 if second else K5], 1e-300),
+                "torque": float(torque[int(second)]),
+                "cosine": value.get(SINES.get(name, ""), 0.0),
+            }
             # of an arm that shows no inertia none, in a number whose square has an inverse
-            found.append((name, term, mean, spread.size * max(unit, 1e-100), spread.usual))
+            size = spread.size * max(units.get(spread.of, 1.0), 1e-100)
+            found.append((name, term, mean, size, spread.usual))
     names, terms, *numbers = zip(*found, strict=True) if found else [()] * 5
     return Expected(names, terms, *map(np.array, numbers))
 
@@ -512,9 +479,8 @@ def shrink(
     """
     beta, share = start
     places = list(map(shared.names.index, expected.names))
-    terms = np.array(expected.terms)
-    alike = np.equal.outer(terms, terms).astype(np.float64)
-    logs, _ = by_kind(logs)
+    alike = np.equal.outer(expected.terms, expected.terms).astype(np.float64)
+    logs = by_kind(logs)
     for _ in range(_STEPS):
         beta, H, _ = combine(shared, logs, beta, joined(known, expected.prior(share)))
         variance = np.diag(scaled_pinv(H))[places]
@@ -539,25 +505,24 @@ def compared(better: Fit, least: Fit) -> tuple[float, float, float]:
     if not places.size:
         return 0.0, 0.0, 1.0
     away = (better.values - least.values)[places]
-    V = np.zeros_like(better.covariance)
-    for one, other in zip(_influences(better), _influences(least), strict=True):
-        # of the first alone where stretches differ
-        variance, _ = long_run_variance(one - other if one.shape == other.shape else one)
-        V = V + variance
+    # of the first alone where stretches differ
+    apart = [
+        long_run_variance(one - other if one.shape == other.shape else one)[0]
+        for one, other in zip(_influences(better), _influences(least), strict=True)
+    ]
+    V = np.sum(apart, axis=0)
     h = float(away @ scaled_pinv(V[np.ix_(places, places)]) @ away)
     distance, moved = (float(np.max(np.abs(away) / fit.std[places])) for fit in (better, least))
     return distance, moved, float(chi2_tail(places.size, max(h, 0.0)))
 
 
-def _influences(fit: Fit) -> list[FloatArray]:
+def _influences(fit: Fit) -> Iterator[FloatArray]:
     """What the stretches (B, Q) of each log move the estimate by."""
     _, H, _ = combine(fit.shared, fit.logs, fit.values, fit.prior)
     inverse = scaled_pinv(H)
-    influences: list[FloatArray] = []
     for log in fit.logs:
         T, scores = scores_of(fit.shared, log, fit.values)
-        influences.append(scores @ T @ inverse)
-    return influences
+        yield scores @ T @ inverse
 
 
 def feedback(fit: Fit, problem: Problem, limit: float) -> Notice | None:
@@ -566,7 +531,7 @@ def feedback(fit: Fit, problem: Problem, limit: float) -> Notice | None:
     By the Bonferroni p value of the residual's correlations with later torques, below `limit`.
     """
     settings = problem.at(fit.shared.model, fit.delay).settings
-    products, variance = np.zeros((2, 2 * _LAGS))
+    sums = np.zeros((2, 2 * _LAGS))
     for kind, sources in problem.kinds():
         for source in sources:
             c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
@@ -574,8 +539,8 @@ def feedback(fit: Fit, problem: Problem, limit: float) -> Notice | None:
             rows = np.concatenate([np.empty((4, 0)), *every], axis=1)
             if rows.shape[1] > 2 * _LAGS:
                 rows -= rows.mean(axis=1, keepdims=True)
-                own, spread = _crossed(rows[:2], rows[2:])
-                products, variance = products + own, variance + spread
+                sums += _crossed(rows[:2], rows[2:])
+    products, variance = sums
     if not np.all(variance > 0):
         return None
     p_value = chance(float(np.max(np.abs(products) / np.sqrt(variance))), products.size)

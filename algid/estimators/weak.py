@@ -19,12 +19,14 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
+from operator import itemgetter
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.base.names import vector
 from algid.estimators.body import with_body
 from algid.estimators.combine import (
     BlockSums,
@@ -48,6 +50,9 @@ State = TypeVar("State")
 Weighed = TypeVar("Weighed")
 Solved = tuple[FloatArray, list[LogInformation]]
 """Coefficients (q,) that logs share, and their likelihoods there."""
+Beside = Callable[[Segment, Windows], FloatArray]
+"""Gives columns (2, m, R) beside those of the model."""
+NO_MEMORY: Mapping[Source, dict[Hashable, Known]] = {}
 PIECE_SAMPLES = 16384
 _SHORTEST = 64  # samples: shorter pieces hold no window
 REWEIGHTINGS = 4
@@ -70,97 +75,108 @@ def fit(problem: Problem) -> Fit:
         If no log is long enough for a window, or there is neither an unloaded log nor a prior.
     """
     settings, shared, prior = problem.settings, problem.shared, problem.prior
-    model = settings.model
-    iterated = [model.names.index(name) for name in model.iterated if name in model.names]
-    compliances = [place for place, _ in acting(model, "elastic")]
-    soft = np.isin(range(len(model.names)), compliances)
+    names = settings.model.names
+    iterated = np.isin(names, settings.model.iterated)
+    soft = np.isin(range(len(names)), [place for place, _ in acting(settings.model, "elastic")])
     at: dict[bool, FloatArray] = {}
     for _ in range(_PASSES):
-        normals = {}
-        for kind, sources in problem.kinds():
-            own = normals_of(sources, settings, at.get(kind))
-            if own:
-                normals[kind] = own
-        solved = {kind: solve(own, kind) for kind, own in normals.items()}
-        beta, logs = first_estimate(shared, solved, prior)
-        base, change = settings.shift.delay, 0.0
+        normals = normals_by_kind(problem, settings, at)
+        beta, logs = first_estimate(shared, normals, prior)
+        every = together(normals)
+        settled = True
         if shared.delay:
-            change = float(beta[len(model.names)])
-            since = base * np.isin(shared.names, DELAYS)
+            change = float(beta[len(names)])
+            settled = abs(change) < _DELAY_SETTLED * max(normal.dt for normal in every)
+            since = settings.shift.delay * np.isin(shared.names, DELAYS)
             beta = beta + since
             logs = [replace(log, c0=log.c0 + since[: log.c0.size]) for log in logs]
-            settings = settings.delayed(base + change)
-        settled = True
-        if not model.linear:
-            before, at = at, {log.loaded: log.c0[: len(model.names)] for log in logs}
-            moves = [np.abs(at[kind] - before.get(kind, np.inf))[iterated] for kind in at]
-            sizes = [np.where(soft, np.abs(at[kind]), 1.0)[iterated] for kind in at]
-            settled = bool(np.all(np.array(moves) <= _SETTLED * np.array(sizes)))
-        every = [normal for own in normals.values() for normal in own]
-        if settled and abs(change) < _DELAY_SETTLED * max(normal.dt for normal in every):
+            settings = settings.delayed(settings.shift.delay + change)
+        before, at = at, {log.loaded: log.c0[: len(names)] for log in logs}
+        for kind, c in at.items():
+            moves = np.abs(c - before.get(kind, np.inf))
+            near = moves <= _SETTLED * np.where(soft, np.abs(c), 1.0)
+            settled &= bool(near[iterated].all())
+        if settled:
             break
     moved = np.max([normal.moved for normal in every], axis=0)
     return with_body(finish("weak", shared, logs, beta, moved, prior, coloured=True))
 
 
 def normals_of(
-    sources: Sequence[Source],
+    sources: Iterable[Source],
     settings: WeakSettings,
     at: FloatArray | None = None,
-    beside: Callable[[Segment, Windows], FloatArray] | None = None,
+    beside: Beside | None = None,
+    memory: Mapping[Source, dict[Hashable, Known]] = NO_MEMORY,
 ) -> list[Normal]:
     """Normal equations of the logs that are long enough for a window: see `normal_equations`."""
-    normals = []
-    for source in sources:
-        normal = normal_equations(source, settings, at, beside=beside)
-        if normal is not None:
-            normals.append(normal)
-    return normals
+    every = (
+        normal_equations(source, settings, at, memory.get(source), beside) for source in sources
+    )
+    return [normal for normal in every if normal is not None]
+
+
+def normals_by_kind(
+    problem: Problem,
+    settings: WeakSettings,
+    at: Mapping[bool, FloatArray],
+    beside: Beside | None = None,
+    memory: Mapping[Source, dict[Hashable, Known]] = NO_MEMORY,
+) -> dict[bool, list[Normal]]:
+    """The same of unloaded (False) and of loaded logs, `at` the coefficients of each kind."""
+    return {
+        kind: normals_of(sources, settings, at.get(kind), beside, memory)
+        for kind, sources in problem.kinds()
+    }
+
+
+def together(normals: Mapping[bool, list[Normal]]) -> list[Normal]:
+    """Those of both kinds, unloaded ones first."""
+    return [normal for kind in normals for normal in normals[kind]]
 
 
 def first_estimate(
-    shared: Shared, solved: Mapping[bool, Solved], prior: Prior | None
-) -> tuple[FloatArray, list[LogInformation]]:
+    shared: Shared, normals: Mapping[bool, Sequence[Normal]], prior: Prior | None
+) -> Solved:
     """Shared parameters from which `finish` starts, and each log's likelihood.
 
-    `solved` holds what unloaded (False) and loaded logs give by themselves, where there are any.
-    The payload is the one that fits the loaded logs best for the arm: masses are tried in turn,
-    each with the lengths that follow from k2 and k4 of both arms (Table 2).
+    Of unloaded (False) and of loaded logs, each kind by itself, where there are any. The payload is
+    the one that fits the loaded logs best for the arm: masses are tried in turn, each with the
+    lengths that follow from k2 and k4 of both arms (Table 2).
 
     Raises
     ------
     TooShortError
         If those that are needed are not there.
     """
-    if False not in solved and (prior is None or True not in solved):
-        raise TooShortError(f"no unloaded {OF_A_WINDOW}")
-    if shared.payload and True not in solved:
-        raise TooShortError(f"no loaded {OF_A_WINDOW}")
-    arm: FloatArray = np.zeros(len(shared.log_names))
-    logs: list[LogInformation] = []
-    if False in solved:
-        arm, logs = solved[False]
-    elif prior is not None:
+    if normals.get(False):
+        arm, logs = solve(normals[False])
+    elif prior is not None and normals.get(True):
+        arm, logs = np.zeros(len(shared.log_names)), []
         arm[prior.places(shared.log_names)] = prior.mean
+    else:
+        raise TooShortError(f"no unloaded {OF_A_WINDOW}")
     if not shared.payload:
         return arm, logs
-    _, under_load = solved[True]
-    ((whole,), _) = by_kind(under_load)
+    if not normals.get(True):
+        raise TooShortError(f"no loaded {OF_A_WINDOW}")
+    _, under_load = solve(normals[True], True)
+    (whole,) = by_kind(under_load)
     # A prior far tighter than the loaded logs holds the arm.
-    hold = Prior.of(shared.log_names, arm, scaled_pinv(whole.total[0]) * 1e-4)
+    hold = Prior(shared.log_names, arm, 1e4 * whole.total[0])
     change = dict(zip(shared.log_names, (whole.c0 - arm).tolist(), strict=True))
-    best: FloatArray | None = None
-    most = -np.inf
+    tried = []
     for mass in _FIRST_MASSES:
         guess = {"m_p": mass}
         for name, moment in (("l1", K4), ("l2", K2)):
             length = change.get(moment, 0.0) / max(mass * shared.model.gravity, 1e-300)
             guess[name] = length if 0.01 < length < 10 else _FIRST_LENGTH
-        start = np.append(arm, [guess[name] for name in shared.names[arm.size :]])
+        start = np.append(arm, vector(shared.names[arm.size :], guess))
         beta, _, value = combine(shared, [whole], start, hold)
-        if value > most and np.all(beta[arm.size :] > 0):
-            best, most = beta, value
-    return start if best is None else best, logs + under_load
+        if np.all(beta[arm.size :] > 0):
+            tried.append((value, beta))
+    _, best = max(tried, key=itemgetter(0), default=(0.0, start))
+    return best, logs + under_load
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,13 +185,12 @@ class Normal:
 
     The torque is the last column.
 
-    `samples` counts the log's samples, `rows` (2,) the windows of each joint, `dt` is in s, and
+    `rows` (2,) counts the windows of each joint, `dt` is in s, and
     `moved` (2,) is the spread of each joint's angle in rad.
     """
 
     gram: FloatArray
     dt: float
-    samples: int
     rows: FloatArray
     moved: FloatArray
 
@@ -190,7 +205,7 @@ def normal_equations(
     settings: WeakSettings,
     at: FloatArray | None = None,
     known: dict[Hashable, Known] | None = None,
-    beside: Callable[[Segment, Windows], FloatArray] | None = None,
+    beside: Beside | None = None,
 ) -> Normal | None:
     """Normal equations of one log; None where it is too short for a window.
 
@@ -200,17 +215,14 @@ def normal_equations(
     (2, m, R) `beside` those of the model stand before the torque.
     """
 
-    def gather(window: float) -> tuple[Normal | None, float]:
+    def gather(settings: WeakSettings) -> tuple[Normal | None, float]:
         sums = BlockSums()
-        samples, rows = 0, np.zeros(2)
-        longest = dt = 0.0
-        low, high = np.full(2, np.inf), np.full(2, -np.inf)
-        for piece, windows, fresh in overlapping(source(), settings, window):
+        rows, longest, dt = np.zeros(2), 0.0, 0.0
+        ends: list[FloatArray] = []
+        for piece, windows in overlapping(source(), settings):
             dt = piece.dt
             longest = max(longest, _seconds(piece))
-            samples += fresh
-            low = np.minimum(low, piece.theta.min(axis=1))
-            high = np.maximum(high, piece.theta.max(axis=1))
+            ends += piece.theta.min(axis=1), piece.theta.max(axis=1)
             kept = None
             if known is not None:
                 kept = known.setdefault((piece.start, len(piece)), {})
@@ -219,35 +231,31 @@ def normal_equations(
                 continue
             if beside is not None:
                 X = np.concatenate([X[:, :-1], beside(piece, windows), X[:, -1:]], axis=1)
-            moving = np.ones((2, X.shape[2]), dtype=bool)
-            if settings.rest is not None:
-                moving = windows.square_speeds(piece) >= np.square(settings.rest)[:, None]
-                X = np.where(moving[:, None], X, 0.0)
+            moving = windows.moving(piece, settings.rest)
             rows += moving.sum(axis=1)
-            sums.add(grams(X, OVERLAP))
+            sums.add(grams(np.where(moving[:, None], X, 0.0), OVERLAP))
         if not rows.any():
             return None, longest
-        return Normal(sums.values(), dt, samples, rows, high - low), longest
+        return Normal(sums.values(), dt, rows, np.ptp(ends, axis=0)), longest
 
-    return _with_window(gather, settings.window)
+    return _with_window(gather, settings)
 
 
 def speeds(sources: Sequence[Source], settings: WeakSettings) -> FloatArray:
     """Speed (2,) in rad/s of each joint, RMS over the windows of logs."""
     squares, count = np.zeros(2), 0
     for source in sources:
-        for piece, windows, _ in overlapping(source(), settings):
-            squares_of_piece = windows.square_speeds(piece)
-            squares += squares_of_piece.sum(axis=1)
-            count += squares_of_piece.shape[1]
+        for piece, windows in overlapping(source(), settings):
+            squares += windows.square_speeds(piece).sum(axis=1)
+            count += windows.count(piece)
     return np.sqrt(squares / max(count, 1))
 
 
 def residual_rows(
-    source: Source, settings: WeakSettings, c: FloatArray, window: float | None = None
+    source: Source, settings: WeakSettings, c: FloatArray
 ) -> Iterator[tuple[Segment, Windows, FloatArray]]:
     """A log's pieces, their windows, and residuals at `c` (q,) above torques' moments (4, R)."""
-    for piece, windows, _ in overlapping(source(), settings, window):
+    for piece, windows in overlapping(source(), settings):
         X = windows.equations(settings.model, piece, False, c)
         residual = X[:, -1] - np.einsum("q,aqr->ar", c, X[:, :-1])
         yield piece, windows, np.concatenate([residual, X[:, -1]])
@@ -259,7 +267,7 @@ def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> Residual
     The windows are those of `normal_equations`; None where the log is too short for one.
     """
 
-    def gather(window: float) -> tuple[list[ResidualSums], float]:
+    def gather(settings: WeakSettings) -> tuple[list[ResidualSums], float]:
         gathered: list[ResidualSums] = []
         rows: list[FloatArray] = []
         longest = spacing = 0.0
@@ -270,7 +278,7 @@ def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> Residual
                 gathered.append(residual_sums(together, spacing, OVERLAP, LAGS * OVERLAP // 2))
             rows.clear()
 
-        for piece, windows, own in residual_rows(source, settings, c, window):
+        for piece, windows, own in residual_rows(source, settings, c):
             longest = max(longest, _seconds(piece))
             if not piece.continues or _count(rows) >= PIECE_SAMPLES:  # no log is held whole
                 add_up()
@@ -279,7 +287,7 @@ def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> Residual
         add_up()
         return gathered, longest
 
-    return pooled(_with_window(gather, settings.window))
+    return pooled(_with_window(gather, settings))
 
 
 def _count(rows: Iterable[FloatArray]) -> int:
@@ -287,11 +295,13 @@ def _count(rows: Iterable[FloatArray]) -> int:
     return sum(part.shape[1] for part in rows)
 
 
-def _with_window(gather: Callable[[float], tuple[Gathered, float]], window: float) -> Gathered:
-    """Gather by windows of `window` s, or shorter if the longest piece holds fewer than four."""
-    gathered, longest = gather(window)
-    if 0 < longest < 4 * window:
-        gathered, _ = gather(longest / 4)
+def _with_window(
+    gather: Callable[[WeakSettings], tuple[Gathered, float]], settings: WeakSettings
+) -> Gathered:
+    """Gather by the settings' windows, or shorter if the longest piece holds fewer than four."""
+    gathered, longest = gather(settings)
+    if 0 < longest < 4 * settings.window:
+        gathered, _ = gather(replace(settings, window=longest / 4))
     return gathered
 
 
@@ -303,24 +313,22 @@ def _seconds(piece: Segment) -> float:
 
 
 def overlapping(
-    segments: Iterable[Segment], settings: WeakSettings, window: float | None = None
-) -> Iterator[tuple[Segment, Windows, int]]:
-    """Pieces that repeat the last samples of the piece before, their windows and fresh samples.
+    segments: Iterable[Segment], settings: WeakSettings
+) -> Iterator[tuple[Segment, Windows]]:
+    """Pieces that repeat the last samples of the piece before, and their windows.
 
     The windows' bandwidth is what the rate and their length leave room for.
     """
     before: Segment | None = None
     windows: Windows | None = None
     left_over = 0
-    if window is None:
-        window = settings.window
     for piece in pieces(segments, PIECE_SAMPLES):
         if windows is None:
             bandwidth = settings.bandwidth
             if bandwidth is not None:
-                bandwidth = max(min(bandwidth, 0.2 / piece.dt), 6.0 / window)
-            windows = Windows(piece.dt, window, settings.shift.at(piece.dt), bandwidth)
-        fresh = len(piece)
+                bandwidth = max(min(bandwidth, 0.2 / piece.dt), 6.0 / settings.window)
+            shift = settings.shift.at(piece.dt)
+            windows = Windows(piece.dt, settings.window, shift, bandwidth)
         if piece.continues and before is not None:
             first = max(len(before) - windows.overlap - left_over, 0)
             piece = replace(append(before.part(first, len(before)), piece), continues=True)
@@ -328,7 +336,7 @@ def overlapping(
         before = piece
         if settings.shift.held and len(piece) > 1:
             piece = replace(piece, tau=Stencil(piece.dt, held=True).moving(piece.tau))
-        yield piece, windows, fresh
+        yield piece, windows
 
 
 def grams(X: FloatArray, rows: int) -> FloatArray:

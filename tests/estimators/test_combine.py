@@ -18,6 +18,7 @@ from algid.estimators.combine import (
     combine,
     jackknife,
     left_out,
+    likelihood,
     scaled_pinv,
 )
 from algid.estimators.parametrisation import Shared
@@ -58,7 +59,7 @@ def test_the_most_likely_payload_is_that_of_another_solver(start: float) -> None
     known, precision = TRUTH[[1, 6]] * 1.1, np.array([[30.0, 5.0], [5.0, 20.0]])
     prior = Prior(("k2", "k7"), known, precision)
     begun = np.append(TRUTH[:7], TRUTH[7:] * start)
-    beta, S, value = combine(SHARED, [log for log, _, _ in logs], begun, prior)
+    beta, S, _ = combine(SHARED, [log for log, _, _ in logs], begun, prior)
 
     def residual(beta: FloatArray) -> FloatArray:
         own = [y - X @ SHARED.coefficients(beta, log.loaded) for log, X, y in logs]
@@ -69,6 +70,8 @@ def test_the_most_likely_payload_is_that_of_another_solver(start: float) -> None
     units = np.outer(TRUTH, TRUTH)
     np.testing.assert_allclose(S * units, (other.jac.T @ other.jac) * units, rtol=1e-3)
     own = sum(0.5 * float(np.sum((y - X @ log.c0) ** 2)) for log, X, y in logs)
+    every = [log for log, _, _ in logs]
+    value, _, _ = likelihood(SHARED, every, beta, prior)
     assert value == pytest.approx(own - other.cost, rel=1e-6)
 
 
