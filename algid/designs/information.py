@@ -30,7 +30,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.estimators.parametrisation import Shared
-from algid.estimators.whitening import NoiseLevels, adjoint, along_stencil, triangular, whitened
+from algid.estimators.whitening import NoiseLevels, adjoint, along_stencil, multipliers, whitened
 from algid.model import Model, Motion, partials, regressor
 from algid.signals.differences import POINTS, Stencil
 
@@ -149,11 +149,10 @@ class Information:
         q, n = slopes.Y.shape[1:]
         to_Y, total = np.zeros_like(slopes.Y), np.zeros((COMPONENTS, n))
         for c, T, count, H, factor, Z in self._logs:
-            by_sample = triangular(factor, Z, "T").reshape(-1, n, 2)
-            W = np.ascontiguousarray(by_sample.transpose(0, 2, 1))
+            W = multipliers(factor, Z)
             AW = np.tensordot(count * T @ A @ T.T, W, axes=1)
             to_Y += 2 * AW[:q].transpose(1, 0, 2) / noise.tau[:, None, None]
-            back = np.stack([adjoint(H, w, 0, n + POINTS - 1) for w in W])  # Gᵀ W
+            back = adjoint(H, W, 0, n + POINTS - 1)  # Gᵀ W
             windows = np.lib.stride_tricks.sliding_window_view(back, n, axis=2)
             along = np.tensordot(self._weights, windows, axes=(1, 2))
             to_P = -2 * np.einsum("qan,oqbn->oabn", AW, along) * ratio[None, :, :, None]

@@ -7,23 +7,21 @@ is the state kept here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from algid.arm import FloatArray
 from algid.base.quantiles import medians
 from algid.estimators.combine import BlockSums, LogInformation
 from algid.estimators.innovations import ResidualSums, residual_sums
 from algid.estimators.noise import (
-    Components,
     VarianceScore,
     first_guess,
-    floored,
-    log_ratio,
     newton_step,
     quantum,
     roughness,
@@ -37,6 +35,7 @@ from algid.estimators.whitening import (
     first_trajectory,
     linearise,
     trajectory,
+    whiten,
 )
 from algid.model import Model, Motion
 from algid.signals.differences import POINTS, Stencil
@@ -109,13 +108,11 @@ class LogEvidence:
         self._trajectories = [first_trajectory(piece.theta, piece.dt) for piece in self.kept]
         floor = _digitisation(self.kept)
         guesses = [first_guess(piece.theta, piece.tau) for piece in self.kept]
-        theta = medians(np.transpose([level.theta for level in guesses]))
-        tau = medians(np.transpose([level.tau for level in guesses]))
-        self._guess = guess = floored(NoiseLevels(theta, tau), floor)
+        guess = _floored(medians(np.stack(guesses, axis=-1)), floor)
         squares = np.mean([roughness(piece.tau) ** 2 for piece in self.kept], axis=0)
         self._rough = np.maximum(guess.tau, np.sqrt(squares))
-        self._floor = replace(floor, tau=np.maximum(floor.tau, SURE * guess.tau))
-        self.noise = guess
+        self._floor = floor._replace(tau=np.maximum(floor.tau, SURE * guess.tau))
+        self.noise = self._guess = guess
         rms = np.max([np.sqrt(np.mean(piece.tau**2, axis=1)) for piece in self.kept], axis=0)
         # A joint without a motor carries a load of the size of the other's.
         self._least = _NEGLIGIBLE * np.where(rms > 0, rms, rms.max())
@@ -154,58 +151,69 @@ class LogEvidence:
         Keeps the trajectories found, and, where they are `free`, better noise levels, which the
         trajectories and the score follow. Levels that are sure stay.
         """
-        gathered, c = _Gathered(), shared.coefficients(beta, self.loaded)
+        sums, c = _Sums(), shared.coefficients(beta, self.loaded)
         scores: list[VarianceScore] = []
-        responses: list[FloatArray] = []
+        changes: list[FloatArray] = []
         scored = free and not self.sure
-        for seed, (piece, theta) in enumerate(zip(self.kept, self._trajectories, strict=True)):
-            linear = self._linearise(shared, c, theta, piece)
-            asked = linear.columns if scored else linear.columns[-1:]
-            multipliers = linear.solve_transposed(asked)
-            self._trajectories[seed] = trajectory(piece, linear, multipliers[-1], self.noise)
-            by_noise = None
+        for seed, (piece, linear) in enumerate(self._trained(shared, c)):
+            self._trajectories[seed] = trajectory(piece, linear, self.noise)
+            by_noise = linear.columns[:0]
             if scored:
-                components = Components.of(linear, multipliers[-1], len(piece))
-                scores.append(variance_score(linear, multipliers, components, seed))
-                responses.append(components.response(linear, self.noise))
-                by_noise = components.whitened
-            gathered.take(linear, piece.dt, self.noise, by_noise)
-        outcome = gathered.outcome(self.loaded, c)
+                score, by_noise, change = variance_score(linear, seed)
+                scores.append(score)
+                changes.append(change)
+            sums.add(linear, piece.dt, self.noise, by_noise)
+        outcome = sums.outcome(self.loaded, c)
         if not scored:
             return outcome
-        score, before = reduce(add, scores), self.noise
-        self.noise = floored(newton_step(before, score, outcome.information.total[0]), self._floor)
-        step = log_ratio(before, self.noise)
+        total = VarianceScore(*(np.sum(one, axis=0) for one in zip(*scores, strict=True)))
+        before, information = self.noise, outcome.information
+        self.noise = _floored(newton_step(before, total, information.total[0]), self._floor)
+        step = 2 * np.log(np.divide(self.noise, before)).ravel()
         followed = np.where(np.abs(step) < _FOLLOWED, step, 0.0)
-        for place, response in enumerate(responses):
-            moved = np.einsum("i,ian->an", followed, response)
+        for place, change in enumerate(changes):
+            moved = before.theta[:, None] * np.tensordot(followed, change, axes=1)
             self._trajectories[place] = self._trajectories[place] + moved
-        information = gathered.followed(outcome.information, followed, score)
+        # every stretch bears as much of its change; scores have changes of their own
+        less = np.tensordot(followed, total.absorbed, axes=1) / len(information.S)
+        fall = sums.products.values()[:, :, len(c) + 1 :] @ followed
+        information = replace(information, S=information.S - less, g=information.g - fall)
         # in its own standard deviations
-        change = float(np.max(np.abs(step) * np.sqrt(np.diag(score.average))))
-        return replace(outcome, information=information, noise_change=change)
+        most = float(np.max(np.abs(step) * np.sqrt(np.diag(total.average))))
+        return replace(outcome, information=information, noise_change=most)
 
     def held(self, shared: Shared, beta: FloatArray) -> Outcome:
         """Pass over the training set at `beta`; trajectories and noise levels stay."""
-        gathered, c = _Gathered(), shared.coefficients(beta, self.loaded)
+        c = shared.coefficients(beta, self.loaded)
+        return self._passed(c, self._trained(shared, c))
+
+    def run(self, shared: Shared, beta: FloatArray) -> Outcome:
+        """Pass over the whole log at `beta`; each piece has its own trajectory."""
+        c = shared.coefficients(beta, self.loaded)
+
+        def linearised() -> Iterator[tuple[Segment, Linearised]]:
+            for piece in self._pieces():
+                start = first_trajectory(piece.theta, piece.dt)
+                first = self._linearise(shared, c, start, piece, residual_only=True)
+                theta = trajectory(piece, first, self.noise)
+                yield piece, self._linearise(shared, c, theta, piece)
+
+        return self._passed(c, linearised())
+
+    def _passed(self, c: FloatArray, parts: Iterable[tuple[Segment, Linearised]]) -> Outcome:
+        sums = _Sums()
+        for piece, linear in parts:
+            sums.add(linear, piece.dt, self.noise, linear.columns[:0])
+        return sums.outcome(self.loaded, c)
+
+    def _trained(self, shared: Shared, c: FloatArray) -> Iterator[tuple[Segment, Linearised]]:
+        """The training set at its trajectories and at the coefficients `c`."""
         for piece, theta in zip(self.kept, self._trajectories, strict=True):
-            gathered.take(self._linearise(shared, c, theta, piece), piece.dt, self.noise)
-        return gathered.outcome(self.loaded, c)
+            yield piece, self._linearise(shared, c, theta, piece)
 
     def forget_noise(self) -> None:
         """Noise levels start where they did."""
         self.noise, self.sure = self._guess, False
-
-    def run(self, shared: Shared, beta: FloatArray) -> Outcome:
-        """Pass over the whole log at `beta`; each piece has its own trajectory."""
-        gathered, c = _Gathered(), shared.coefficients(beta, self.loaded)
-        for piece in self._pieces():
-            start = first_trajectory(piece.theta, piece.dt)
-            first = self._linearise(shared, c, start, piece, residual_only=True)
-            multiplier = first.solve_transposed(first.columns[-1:])[0]
-            theta = trajectory(piece, first, multiplier, self.noise)
-            gathered.take(self._linearise(shared, c, theta, piece), piece.dt, self.noise)
-        return gathered.outcome(self.loaded, c)
 
     @property
     def relative_error(self) -> float:
@@ -219,13 +227,11 @@ class LogEvidence:
         them the logarithm of the covariance's determinant.
         """
         gram, determinant, model = np.zeros(()), 0.0, shared.model
-        for piece, theta in zip(self.kept, self._trajectories, strict=True):
-            linear = self._linearise(shared, c, theta, piece)
+        for piece, linear in self._trained(shared, c):
             made = beside(model, c[: len(model.names)], linear.motion, piece.dt)
-            rows = (made / self.noise.tau[None, :, None]).swapaxes(1, 2)
-            rows = np.ascontiguousarray(rows).reshape(rows.shape[0], -1)
-            residual, own = linear.columns[-1:], linear.columns[:-1]
-            columns = np.concatenate([own, linear.solve_in_place(rows), residual])
+            rows = whiten(linear.factor, made / self.noise.tau[:, None])
+            own, residual = np.split(linear.columns, [-1])
+            columns = np.concatenate([own, rows, residual])
             by_joint = columns.reshape(len(columns), -1, 2).transpose(2, 0, 1)
             gram = gram + by_joint @ by_joint.swapaxes(1, 2)
             determinant += 2 * float(np.log(linear.factor[-1]).sum())
@@ -292,54 +298,38 @@ def _digitisation(kept: Sequence[Segment]) -> NoiseLevels:
     return NoiseLevels(*least)
 
 
-class _Gathered:
-    """A log's information and score, by stretches, and its innovations."""
+def _floored(noise: ArrayLike, floor: NoiseLevels) -> NoiseLevels:
+    return NoiseLevels(*np.maximum(noise, floor))
+
+
+class _Sums:
+    """A log's innovations, and by stretches the products (q, q + 1 + m) of its columns.
+
+    Those are with themselves, with the innovations, and with how these fall with the noise.
+    """
 
     def __init__(self) -> None:
-        self._S, self._g, self._by_noise = BlockSums(), BlockSums(), BlockSums()
+        self.products = BlockSums()
         self._residual: list[ResidualSums] = []
         self._deviance = 0.0
 
-    def take(
-        self,
-        linear: Linearised,
-        dt: float,
-        noise: NoiseLevels,
-        by_noise: FloatArray | None = None,
-    ) -> None:
+    def add(self, linear: Linearised, dt: float, noise: NoiseLevels, by_noise: FloatArray) -> None:
         """Add a piece, its samples `dt` s apart, whitened by such noise.
 
-        `by_noise` (4, 2 n) is how the innovations fall with each log variance.
+        `by_noise` (m, 2 n) is how the innovations fall with log variances.
         """
-        columns, w = linear.columns, linear.columns[-1]
+        columns, w = np.concatenate([linear.columns, by_noise]), linear.columns[-1]
         own = w @ w + 2 * np.log(linear.factor[-1]).sum() + w.size * np.log(noise.tau).sum()
         self._deviance += float(own)
-        q, rows = columns.shape[0] - 1, 2 * _STRETCH
-        if by_noise is not None:
-            columns = np.concatenate([columns, by_noise])
-        count = -(-w.size // rows)
-        padded = np.zeros((columns.shape[0], count * rows))
-        padded[:, : w.size] = columns
-        parts = padded.reshape(-1, count, rows).swapaxes(0, 1)
-        gram = parts[:, :q] @ parts.swapaxes(1, 2)
-        self._S.add(gram[:, :, :q])
-        self._g.add(gram[:, :, q])
-        if by_noise is not None:
-            self._by_noise.add(gram[:, :, q + 1 :])
+        rows = 2 * _STRETCH
+        padded = np.pad(columns, [(0, 0), (0, -w.size % rows)])
+        parts = padded.reshape(len(columns), -1, rows).swapaxes(0, 1)
+        q = len(linear.columns) - 1
+        self.products.add(parts[:, :q] @ parts.swapaxes(1, 2))
         self._residual.append(residual_sums(np.ascontiguousarray(w.reshape(-1, 2).T), dt))
 
     def outcome(self, loaded: bool, c: FloatArray) -> Outcome:
-        """What the pass at the coefficients `c` has given."""
-        information = LogInformation(loaded, c, self._S.values(), self._g.values())
+        """What the pass at the coefficients `c` (q,) has given."""
+        S, g, _ = np.split(self.products.values(), [len(c), len(c) + 1], axis=2)
+        information = LogInformation(loaded, c, S, g[:, :, 0])
         return Outcome(information, reduce(add, self._residual), self._deviance)
-
-    def followed(
-        self, information: LogInformation, step: FloatArray, score: VarianceScore
-    ) -> LogInformation:
-        """The information after a `step` (4,) of log variances, to first order.
-
-        Every stretch bears as much of its change; scores have changes of their own.
-        """
-        change = np.einsum("i,ixy->xy", step, score.absorbed) / len(information.S)
-        g = information.g - self._by_noise.values() @ step
-        return replace(information, S=information.S - change, g=g)

@@ -19,9 +19,10 @@ component  order: angle 1, angle 2, torque 1, torque 2  (4,)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import lru_cache
 from math import comb
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,13 @@ from numpy.typing import NDArray
 from algid.arm import FloatArray
 from algid.base.quantiles import medians
 from algid.estimators.combine import scaled_pinv
-from algid.estimators.whitening import Linearised, NoiseLevels, adjoint, forward
+from algid.estimators.whitening import (
+    Linearised,
+    NoiseLevels,
+    forward,
+    multipliers,
+    whiten,
+)
 
 _DIFFERENCE = 6  # order of the difference that leaves only noise of a smooth signal
 _FED_BACK = 0.9
@@ -39,6 +46,7 @@ _MOST_SAMPLES = 8192
 _FEWEST_SAMPLES = 10 * 2 * _LAGS
 _RIDGE = 1e-9  # of the angles' sums of squares
 _PROBES = 8
+_SIGNS = np.array([-1, 1], dtype=np.int8)
 _GROWING = 1.0  # standard deviations of the score
 _LARGEST_STEP = 2.0  # in log σ²
 _SMALLEST = 1e-12  # relative to the signal: below it floating point is the noise
@@ -46,70 +54,13 @@ _SMALLEST = 1e-12  # relative to the signal: below it floating point is the nois
 _MOTORLESS = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class VarianceScore:
+class VarianceScore(NamedTuple):
     """Sums: λᵀV_iλ (4,), traces (4,), average information (4, 4), YᵀV⁻¹V_iV⁻¹Y (4, q, q)."""
 
     power: FloatArray
     trace: FloatArray
     average: FloatArray
     absorbed: FloatArray
-
-    def __add__(self, other: VarianceScore) -> VarianceScore:
-        return VarianceScore(
-            self.power + other.power,
-            self.trace + other.trace,
-            self.average + other.average,
-            self.absorbed + other.absorbed,
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Components:
-    """What each component has in the residual of a linearised piece, in its units.
-
-    Parameters
-    ----------
-    back : (2, N)
-        Hᵀλ, of the angles.
-    smeared : (2, n)
-        Fᵀλ, of the torques.
-    whitened : (4, 2 n)
-        L⁻¹V_iλ.
-    """
-
-    back: FloatArray
-    smeared: FloatArray
-    whitened: FloatArray
-
-    @classmethod
-    def of(cls, linear: Linearised, multiplier: FloatArray, length: int) -> Components:
-        """Those of a piece with λ = L⁻ᵀL⁻¹e (2 n,), its angles `length` samples long."""
-        H, first = linear.H, linear.first
-        residual = _by_joint(multiplier)
-        back, smeared = adjoint(H, residual, first, length), linear.smeared_back(residual)
-        directions = np.stack(
-            [
-                forward(H, _only(back, 0), first),
-                forward(H, _only(back, 1), first),
-                linear.smeared(_only(smeared, 0)),
-                linear.smeared(_only(smeared, 1)),
-            ]
-        )
-        return cls(back, smeared, linear.solve_in_place(_by_row(directions)))
-
-    def response(self, linear: Linearised, noise: NoiseLevels) -> FloatArray:
-        """Derivative (4, 2, N) of the most likely angles by each log σ_i², in rad.
-
-        Of Σ_θ Gᵀ V⁻¹e it is −Σ_θ Gᵀ V⁻¹ V_i V⁻¹e, and Gᵀ V⁻¹e for an angle's own variance.
-        """
-        length = self.back.shape[1]
-        rows = linear.solve_transposed(self.whitened)
-        backs = [adjoint(linear.H, _by_joint(row), linear.first, length) for row in rows]
-        change = -np.stack(backs)
-        for joint in range(2):
-            change[joint, joint] += self.back[joint]
-        return change * noise.theta[:, None]
 
 
 def first_guess(theta: FloatArray, tau: FloatArray) -> NoiseLevels:
@@ -221,84 +172,57 @@ def _step(values: FloatArray) -> float:
 
 
 def variance_score(
-    linear: Linearised, multipliers: FloatArray, components: Components, seed: int
-) -> VarianceScore:
-    """Contribution of one linearised piece.
+    linear: Linearised, seed: int = 0
+) -> tuple[VarianceScore, FloatArray, FloatArray]:
+    """What one linearised piece contributes, and what follows from each log σ_i².
 
     Parameters
     ----------
     linear : Linearised
-    multipliers : (q + 1, 2 n)
-        L⁻ᵀ of its columns.
-    components : Components
-        Of the last of them.
     seed : int
         Of the random signs of the traces.
+
+    Returns
+    -------
+    The contribution, L⁻¹V_iλ (4, 2 n), by which the innovations fall with each log σ_i², and the
+    derivative (4, 2, N) of the most likely angles over their noise: of Gᵀ V⁻¹e it is
+    −Gᵀ V⁻¹ V_i V⁻¹e, and Gᵀ V⁻¹e for an angle's own variance.
     """
-    H, first, length = linear.H, linear.first, components.back.shape[1]
-    rows = linear.columns.shape[1]
-    parts = components.back, components.smeared
-    power = np.concatenate([np.sum(part**2, axis=1) for part in parts])
-    joints = np.stack([_by_joint(row) for row in multipliers[:-1]])
-    backs = np.stack([adjoint(H, joint, first, length) for joint in joints])
-    smears = linear.smeared_back(joints)
-    absorbed = [backs[:, 0] @ backs[:, 0].T, backs[:, 1] @ backs[:, 1].T]
-    absorbed += [smears[:, 0] @ smears[:, 0].T, smears[:, 1] @ smears[:, 1].T]
-    return VarianceScore(
-        power,
-        _traces(linear, length, rows, seed),
-        0.5 * components.whitened @ components.whitened.T,
-        np.stack(absorbed),
+    lambdas = multipliers(linear.factor, linear.columns)
+    back, smeared = linear.to_angles(lambdas), linear.smeared_back(lambdas)
+    products = np.stack([x @ x.T for part in (back, smeared) for x in part.swapaxes(0, 1)])
+    whitened = whiten(linear.factor, _made(linear, back[-1], smeared[-1]))
+    change = -linear.to_angles(multipliers(linear.factor, whitened))
+    change[[0, 1], [0, 1]] += back[-1]
+    trace = np.zeros(4)
+    for on_angles, on_torques in _signs(seed, back.shape[-1], smeared.shape[-1]):
+        probe = whiten(linear.factor, _made(linear, on_angles, on_torques))
+        trace += np.sum(probe**2, axis=1) / _PROBES
+    score = VarianceScore(
+        products[:, -1, -1], trace, 0.5 * whitened @ whitened.T, products[:, :-1, :-1]
     )
+    return score, whitened, change
 
 
-def _traces(linear: Linearised, length: int, rows: int, seed: int) -> FloatArray:
-    H, first, n = linear.H, linear.first, rows // 2
-    on_torques, on_angles = _signs(seed, linear.torques, length)
-    probes = np.zeros((_PROBES, 4, n, 2))  # in the rows' order from the beginning
-    felt, products = np.empty((2, n)), np.empty((2, n))
-    for probe, angles in zip(probes, on_angles.astype(np.float64), strict=True):
-        for joint in range(2):
-            felt[:] = 0.0
-            for point in range(H.shape[2]):  # as `forward` of the one joint's signs
-                touched = angles[joint, first + point : first + point + n]
-                np.multiply(H[:, joint, point], touched, out=products)
-                felt += products
-            probe[joint] = felt.T
-    signs = linear.smeared(on_torques.astype(np.float64))
+def _made(linear: Linearised, angles: FloatArray, torques: FloatArray) -> FloatArray:
+    """Torques (4, 2, n) that noise of each joint's angle (2, N) and torque (2, n) alone makes."""
+    made = np.zeros((4, *torques.shape))
     for joint in range(2):
-        probes[:, 2 + joint, :, joint] = signs[:, joint]
-    whitened = linear.solve_in_place(probes.reshape(-1, rows))
-    powers = np.sum(np.square(whitened, out=whitened), axis=1)
-    return np.asarray(powers.reshape(_PROBES, 4).mean(axis=0))
+        own = [joint]
+        made[joint] = forward(linear.H[:, own], angles[own], linear.first)
+        made[2 + joint, joint] = linear.smeared(torques[joint])
+    return made
 
 
 @lru_cache(maxsize=32)
-def _signs(seed: int, torques: int, angles: int) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-    """Random signs of torques (`_PROBES`, 2, n) and angles (`_PROBES`, 2, N); fixed for a piece."""
-    signs = np.random.default_rng(seed)
-    on_torques = np.empty((_PROBES, 2, torques), dtype=np.int8)
-    on_angles = np.empty((_PROBES, 2, angles), dtype=np.int8)
-    for probe in range(_PROBES):
-        on_torques[probe] = signs.choice([-1.0, 1.0], (2, torques))
-        on_angles[probe] = signs.choice([-1.0, 1.0], (2, angles))
-    return on_torques, on_angles
-
-
-def _by_joint(row: FloatArray) -> FloatArray:
-    return np.ascontiguousarray(row.reshape(-1, 2).T)
-
-
-def _by_row(joints: FloatArray) -> FloatArray:
-    """(m, 2, n) as rows (m, 2 n) of sample and joint."""
-    return np.ascontiguousarray(joints.swapaxes(1, 2)).reshape(joints.shape[0], -1)
-
-
-def _only(signal: FloatArray, joint: int) -> FloatArray:
-    """A signal (..., 2, n) of one joint, that of the other nothing."""
-    kept = np.zeros_like(signal)
-    kept[..., joint, :] = signal[..., joint, :]
-    return kept
+def _signs(seed: int, angles: int, torques: int) -> Sequence[tuple[NDArray[Any], NDArray[Any]]]:
+    """Random signs of angles (2, N) and torques (2, n), `_PROBES` times; fixed for a piece."""
+    draw = np.random.default_rng(seed).choice
+    probes = []
+    for _ in range(_PROBES):
+        on_torques, on_angles = draw(_SIGNS, (2, torques)), draw(_SIGNS, (2, angles))
+        probes.append((on_angles, on_torques))
+    return probes
 
 
 def newton_step(noise: NoiseLevels, score: VarianceScore, S: FloatArray) -> NoiseLevels:
@@ -324,16 +248,4 @@ def newton_step(noise: NoiseLevels, score: VarianceScore, S: FloatArray) -> Nois
     # whose score grows, goes to where it is seen, at an information of 1 (which goes as σ⁴).
     unseen = (size < 1.0) & (gradient > _GROWING * np.sqrt(size))
     step = np.where(unseen, np.maximum(step, -0.5 * np.log(np.maximum(size, 1e-300))), step)
-    factor = np.exp(0.5 * step)
-    return NoiseLevels(noise.theta * factor[:2], noise.tau * factor[2:])
-
-
-def log_ratio(before: NoiseLevels, after: NoiseLevels) -> FloatArray:
-    """Change (4,) of each component's log variance."""
-    ratio = np.concatenate([after.theta / before.theta, after.tau / before.tau])
-    return np.asarray(2 * np.log(ratio))
-
-
-def floored(noise: NoiseLevels, floor: NoiseLevels) -> NoiseLevels:
-    """Levels no smaller than `floor`."""
-    return NoiseLevels(np.maximum(noise.theta, floor.theta), np.maximum(noise.tau, floor.tau))
+    return NoiseLevels(*np.exp(0.5 * step).reshape(2, 2) * noise)

@@ -26,11 +26,13 @@ Rows run (sample, joint): joint 1 and joint 2 of a sample are neighbours.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from algid.arm import FloatArray, keep_arrays
+from algid.arm import FloatArray
 from algid.base.compiled import lapack
 from algid.estimators.elastic import flexed, with_bends
 from algid.model import Model, Motion, partials, regressor, sensitivity, torque
@@ -39,19 +41,17 @@ from algid.signals.filters import recursion, smoothed
 from algid.signals.segments import Segment
 
 _SMOOTHING = 40.0  # Hz: arms move slower; of the trajectory at which a piece is first linearised
+_AS_LOGGED = np.ones(1)
+"""The taps of a torque that counts as it is logged."""
 _ROUNDING = 8 * np.finfo(np.float64).eps
 """A pivot's least share of its diagonal: below it, every digit of the pivot is lost."""
 
 
-@dataclass(frozen=True, eq=False)
-class NoiseLevels:
+class NoiseLevels(NamedTuple):
     """Standard deviations of white noise on the angles (2,) in rad and the torques (2,) in N m."""
 
     theta: FloatArray
     tau: FloatArray
-
-    def __post_init__(self) -> None:
-        keep_arrays(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,34 +59,21 @@ class Linearised:
     """One piece of log, linearised and whitened: see the module's table.
 
     `factor` holds Lᵀ as LAPACK's upper band; `first` is the angle sample of the first stencil's
-    first point; `motion` is where the columns but the residual stand; `taps` are
-    F's.
+    first point, of so many `angles`; `motion` is where the columns but the residual stand; `taps`
+    are F's.
     """
 
     columns: FloatArray
     factor: FloatArray
     H: FloatArray
     first: int
-    residual: FloatArray
+    angles: int
     motion: Motion
-    taps: FloatArray = field(default_factory=lambda: np.ones(1))
+    taps: FloatArray
 
-    @property
-    def torques(self) -> int:
-        """Torque samples, of which there is noise."""
-        return int(self.H.shape[-1])
-
-    def solve(self, columns: FloatArray) -> FloatArray:
-        """L⁻¹ of columns (m, 2 n)."""
-        return triangular(self.factor, columns, "N")
-
-    def solve_in_place(self, columns: FloatArray) -> FloatArray:
-        """L⁻¹ of columns (m, 2 n), which are gone then."""
-        return triangular(self.factor, columns, "N", in_place=True)
-
-    def solve_transposed(self, columns: FloatArray) -> FloatArray:
-        """L⁻ᵀ of columns (m, 2 n)."""
-        return triangular(self.factor, columns, "T")
+    def to_angles(self, rows: FloatArray) -> FloatArray:
+        """Hᵀ (..., 2, N) of rows (..., 2, n)."""
+        return adjoint(self.H, rows, self.first, self.angles)
 
     def smeared(self, torques: FloatArray) -> FloatArray:
         """F of torque noise (..., n)."""
@@ -103,24 +90,20 @@ def _padded(rows: FloatArray, taps: FloatArray) -> FloatArray:
     return weighted(np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(reach, reach)]), taps)
 
 
-def triangular(
-    factor: FloatArray, columns: FloatArray, transposed: str, *, in_place: bool = False
-) -> FloatArray:
-    """L⁻¹ of columns (m, 2 n), or L⁻ᵀ where `transposed` is "T" and not "N".
+def whiten(factor: FloatArray, rows: FloatArray) -> FloatArray:
+    """L⁻¹ (m, 2 n) of torques (m, 2, n) over their noise, by the band of Lᵀ."""
+    # of an upper triangle transposed, which LAPACK solves by products of rows: a quarter faster
+    return _solved(factor, rows.swapaxes(1, 2).reshape(len(rows), -1), "T")
 
-    `factor` is the band of Lᵀ: LAPACK solves the transpose of an upper triangle by products of
-    rows, a quarter faster than a lower one by sums of columns. With `in_place` the columns'
-    memory takes the solution.
 
-    Raises
-    ------
-    LinAlgError
-        Where the band is singular.
-    """
-    of_upper = {"N": "T", "T": "N"}[transposed]
-    solution, info = lapack.dtbtrs(
-        factor, columns.T, uplo="U", trans=of_upper, overwrite_b=in_place
-    )
+def multipliers(factor: FloatArray, columns: FloatArray) -> FloatArray:
+    """L⁻ᵀ (m, 2, n) of whitened columns (m, 2 n), by the band of Lᵀ."""
+    rows = _solved(factor, columns, "N")
+    return np.ascontiguousarray(rows.reshape(len(rows), -1, 2).swapaxes(1, 2))
+
+
+def _solved(factor: FloatArray, columns: FloatArray, transposed: str) -> FloatArray:
+    solution, info = lapack.dtbtrs(factor, columns.T, uplo="U", trans=transposed)
     if info != 0:
         raise np.linalg.LinAlgError(f"banded substitution failed with info {info}")
     return solution.T
@@ -189,11 +172,11 @@ def linearise(
             parts.append(np.gradient(rising, stencil.dt, axis=1)[None])
     parts.append(error[None])
     H, factor, columns = whitened(np.concatenate(parts), G, noise, stencil.taps)
-    return Linearised(columns, factor, H, first, error, motion, stencil.taps)
+    return Linearised(columns, factor, H, first, length, motion, stencil.taps)
 
 
 def whitened(
-    rows: FloatArray, G: FloatArray, noise: NoiseLevels, taps: FloatArray | None = None
+    rows: FloatArray, G: FloatArray, noise: NoiseLevels, taps: FloatArray = _AS_LOGGED
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """H, the factor of V, and the whitened columns (m, 2 n) of torques `rows` (m, 2, n) in N m.
 
@@ -202,19 +185,16 @@ def whitened(
     rows : (m, 2, n), N m over each column's unit
     G : (2, 2, POINTS, n), `along_stencil`
     noise : NoiseLevels
-    taps : (p,), optional
-        `Stencil.taps`; none are those of a torque as it is logged.
+    taps : (p,), `Stencil.taps`
 
     Raises
     ------
     numpy.linalg.LinAlgError
         If the covariance is not positive definite in floating point.
     """
-    H = G * (noise.theta[None, :, None, None] / noise.tau[:, None, None, None])
+    H = G * (noise.theta / noise.tau[:, None])[:, :, None, None]
     factor = covariance_factor(H, taps)
-    by_sample = np.ascontiguousarray((rows / noise.tau[None, :, None]).swapaxes(1, 2))
-    columns = triangular(factor, by_sample.reshape(rows.shape[0], -1), "N", in_place=True)
-    return H, factor, columns
+    return H, factor, whiten(factor, rows / noise.tau[:, None])
 
 
 def modelled(
@@ -271,30 +251,27 @@ def forward(G: FloatArray, x: FloatArray, first: int) -> FloatArray:
 
     `first` is the sample of the first stencil's first point.
     """
-    n = G.shape[-1]
-    result = np.zeros((2, n))
-    for point in range(G.shape[2]):
-        result += np.einsum("abn,bn->an", G[:, :, point], x[:, first + point : first + point + n])
-    return result
+    windows = sliding_window_view(x, G.shape[-1], axis=1)[:, first : first + G.shape[2]]
+    return np.asarray(np.einsum("abpn,bpn->an", G, windows))
 
 
 def adjoint(G: FloatArray, y: FloatArray, first: int, length: int) -> FloatArray:
-    """Gᵀ y (2, N) of torques y (2, n), N = `length`: the transpose of `forward`."""
+    """Gᵀ y (..., 2, N) of torques y (..., 2, n), N = `length`: the transpose of `forward`."""
     n = G.shape[-1]
-    result = np.zeros((2, length))
+    result = np.zeros((*y.shape[:-1], length))
     for point in range(G.shape[2]):
-        result[:, first + point : first + point + n] += np.einsum("abn,an->bn", G[:, :, point], y)
+        touched = result[..., first + point : first + point + n]
+        touched += np.einsum("abn,...an->...bn", G[:, :, point], y)
     return result
 
 
-def covariance_factor(H: FloatArray, taps: FloatArray | None = None) -> FloatArray:
+def covariance_factor(H: FloatArray, taps: FloatArray = _AS_LOGGED) -> FloatArray:
     """Cholesky factor Lᵀ of V = F Fᵀ + H Hᵀ.
 
     Parameters
     ----------
     H : (2, 2, POINTS, n)
-    taps : (p,), optional
-        Of F; without them F is I.
+    taps : (p,), of F
 
     Returns
     -------
@@ -305,45 +282,19 @@ def covariance_factor(H: FloatArray, taps: FloatArray | None = None) -> FloatArr
     numpy.linalg.LinAlgError
         If V is not positive definite in floating point.
     """
-    band = products(H)
-    F = np.ones(1) if taps is None else taps
-    for lag, value in enumerate(np.correlate(F, F, "full")[F.size - 1 :]):
-        band[:, :, -1 - 2 * lag] += value
-    return factored(band)
-
-
-def products(H: FloatArray, lags: int | None = None) -> FloatArray:
-    """Upper band (n, 2, 2 `lags`) of H Hᵀ, H (2, 2, points, n), by default with `points` lags."""
     points, n = H.shape[2:]
-    lags = lags or points
-    band = np.zeros((n, 2, 2 * lags))
+    band = np.zeros((n, 2, 2 * points))
     for lag in range(points):
-        block, scratch = np.zeros((2, 2, n - lag)), np.empty((2, 2, n - lag))
-        for point in range(points - lag):
-            early, late = H[:, :, lag + point, : n - lag], H[:, :, point, lag:]
-            for b in range(2):
-                # New memory for each product would take longer than the products.
-                np.multiply(early[:, None, b], late[None, :, b], out=scratch)
-                block += scratch
-        for a in range(2):
-            for other in range(2):
-                above = 2 * lag + other - a
-                if above >= 0:
-                    band[lag:, other, -1 - above] = block[a, other]
-    return band
-
-
-def factored(band: FloatArray) -> FloatArray:
-    """Cholesky factor of a matrix by its upper band (n, 2, width), which is gone then.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the matrix is not positive definite in floating point.
-    """
-    n, _, width = band.shape
+        early, late = H[:, :, lag:, : n - lag], H[:, :, : points - lag, lag:]
+        block = np.einsum("abpn,obpn->aon", early, late)
+        for a, other in np.ndindex(2, 2):
+            above = 2 * lag + other - a
+            if above >= 0:
+                band[lag:, other, -1 - above] = block[a, other]
+    for lag, value in enumerate(np.correlate(taps, taps, "full")[taps.size - 1 :]):
+        band[:, :, -1 - 2 * lag] += value
     diagonal = band[:, :, -1].ravel().copy()
-    factor, info = lapack.dpbtrf(band.reshape(2 * n, width).T, lower=0, overwrite_ab=1)
+    factor, info = lapack.dpbtrf(band.reshape(2 * n, -1).T, lower=0, overwrite_ab=1)
     if info == 0:
         # Whether a pivot of nothing but rounding comes out below zero depends on the processor's
         # kernels.
@@ -362,23 +313,7 @@ def first_trajectory(theta: FloatArray, dt: float) -> FloatArray:
     return smoothed(theta, dt, min(_SMOOTHING, 0.1 / dt))
 
 
-def trajectory(
-    piece: Segment, linear: Linearised, multiplier: FloatArray, noise: NoiseLevels
-) -> FloatArray:
-    """Most likely angles θ_m + Σ_θ Gᵀ V⁻¹e.
-
-    Parameters
-    ----------
-    piece : Segment of N samples
-    linear : Linearised
-    multiplier : (2 n,), V⁻¹e
-    noise : NoiseLevels
-
-    Returns
-    -------
-    (2, N), rad
-    """
-    y = np.ascontiguousarray(multiplier.reshape(-1, 2).T)
-    return piece.theta + noise.theta[:, None] * adjoint(
-        linear.H, y, linear.first, piece.theta.shape[1]
-    )
+def trajectory(piece: Segment, linear: Linearised, noise: NoiseLevels) -> FloatArray:
+    """Most likely angles θ_m + Σ_θ Gᵀ V⁻¹e (2, N) in rad of a piece of N samples."""
+    (back,) = linear.to_angles(multipliers(linear.factor, linear.columns[-1:]))
+    return np.asarray(piece.theta + noise.theta[:, None] * back)

@@ -141,7 +141,7 @@ def noise_of(result: Result) -> NoiseLevels | None:
     levels = vector(("theta1", "theta2", "tau1", "tau2"), result.fit.noise, otherwise=0.0)
     if levels.min() <= 0:
         return None
-    return NoiseLevels(levels[:2], levels[2:])
+    return NoiseLevels(*levels.reshape(2, 2))
 
 
 def torque_constants(result: Result, model: Model, role: Role, file: str) -> FloatArray:

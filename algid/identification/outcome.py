@@ -182,8 +182,7 @@ def fit_summary(found: Fitted) -> results.FitSummary:
     residual, crossed = _predicted(found)
     noise = {}  # root mean squares over the logs
     if fit.noise:
-        levels = np.square([np.append(one.theta, one.tau) for one in fit.noise])
-        squares = np.sqrt(np.mean(levels, axis=0)).tolist()
+        squares = np.sqrt(np.mean(np.square(fit.noise), axis=0)).ravel().tolist()
         noise = dict(zip(("theta1", "theta2", "tau1", "tau2"), squares, strict=True))
     there, lost = places_outside(fit.names, fit.absent), np.isinf(fit.std)
     covariance = np.where(lost | lost[:, None], np.inf, fit.covariance)[np.ix_(there, there)]

@@ -111,8 +111,7 @@ class IdentifiedArm:
         theta = first_trajectory(piece.theta, piece.dt)
         if settle:
             first = linearise(self.model, c, theta, piece, stencil, self.noise, residual_only=True)
-            multiplier = first.solve_transposed(first.columns)[0]
-            theta = trajectory(piece, first, multiplier, self.noise)
+            theta = trajectory(piece, first, self.noise)
         return linearise(self.model, c, theta, piece, stencil, self.noise)
 
 

@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.estimators.whitening import Linearised, modelled
+from algid.estimators.whitening import Linearised, modelled, whiten
 from algid.model import inertia
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.segments import Segment, append
@@ -87,8 +87,7 @@ class Rows:
 
     def whitened(self, rows: FloatArray) -> FloatArray:
         """L⁻¹ (S, 2 n) of rows (S, 2, n)."""
-        flat = np.ascontiguousarray(rows.swapaxes(1, 2)).reshape(rows.shape[0], -1)
-        return self.linear.solve(flat)
+        return whiten(self.linear.factor, rows)
 
     def steps(self, moments: FloatArray) -> FloatArray:
         """Columns (S, 2 n) of a kilogram that is grasped at each of `moments` (S,)."""

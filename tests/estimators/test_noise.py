@@ -9,13 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from algid.arm import FloatArray
-from algid.estimators.noise import (
-    Components,
-    VarianceScore,
-    first_guess,
-    quantum,
-    variance_score,
-)
+from algid.estimators.noise import first_guess, quantum, variance_score
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise
 from algid.model import Model
 from algid.signals.differences import Stencil
@@ -83,18 +77,13 @@ def linear(request: pytest.FixtureRequest, bench: Bench) -> Linearised:
     )
 
 
-def _scored(linear: Linearised, seed: int = 0) -> VarianceScore:
-    multipliers = linear.solve_transposed(linear.columns)
-    return variance_score(linear, multipliers, Components.of(linear, multipliers[-1], ANGLES), seed)
-
-
 def test_the_score_is_that_of_dense_algebra(linear: Linearised) -> None:
     parts, columns = _parts(linear)
     V = sum(parts[1:], parts[0])
     inverse = np.linalg.inv(V)
     Y, e = columns[:, :-1], columns[:, -1]
     lam = inverse @ e
-    found = _scored(linear)
+    found, whitened, change = variance_score(linear, 0)
     rounding = np.linalg.cond(V) * np.finfo(float).eps
     np.testing.assert_allclose(
         found.power, [lam @ part @ lam for part in parts], rtol=1e3 * rounding
@@ -105,7 +94,17 @@ def test_the_score_is_that_of_dense_algebra(linear: Linearised) -> None:
         expected = Y.T @ inverse @ part @ inverse @ Y
         scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
         np.testing.assert_allclose(one / scale, expected / scale, atol=1e3 * rounding)
-    traces = np.array([_scored(linear, seed).trace for seed in range(30)])
+    # how innovations and angles follow from each log σ_i²
+    factor, H = lower(linear.factor), dense(linear.H, linear.first, ANGLES)
+    by_noise = np.linalg.solve(factor, np.transpose([part @ lam for part in parts])).T
+    scale = np.abs(by_noise).max()
+    np.testing.assert_allclose(whitened, by_noise, atol=1e3 * rounding * scale)
+    angles = np.array([-H.T @ inverse @ part @ lam for part in parts])
+    for joint in range(2):
+        angles[joint, joint::2] += (H.T @ lam)[joint::2]
+    found_angles = change.swapaxes(1, 2).reshape(4, -1)
+    np.testing.assert_allclose(found_angles, angles, atol=1e3 * rounding * np.abs(angles).max())
+    traces = np.array([variance_score(linear, seed)[0].trace for seed in range(30)])
     expected = np.array([np.trace(inverse @ part) for part in parts])
     assert np.all(
         np.abs(traces.mean(axis=0) - expected)
