@@ -13,7 +13,7 @@ m_p     tip payload                         scalar      kg
 ======  ==================================  ==========  ===============
 
 θ1 is measured from the horizontal, θ2 from link 1; gravity pulls along −y. An arm with a payload
-obeys the same equations with the constants of `with_payload`, so everything below serves both.
+obeys the same equations with other constants, so everything below serves both.
 """
 
 from __future__ import annotations
@@ -74,33 +74,19 @@ class Arm:
     delta1: float = 0.0
     delta2: float = 0.0
 
-    def constants(self) -> FloatArray:
-        """Constants k1 … k7 (Table 1): (7,), in `algid.model.UNITS`.
+    def constants(self, m_p: float = 0.0) -> FloatArray:
+        """Constants k1 … k7 (Table 1): (7,), in `algid.model.UNITS`; with `m_p` kg at the tip.
 
         Of phasors the parts along the links.
         """
-        along1, along2 = self.lc1 * np.cos(self.delta1), self.lc2 * np.cos(self.delta2)
-        return np.array(
-            [
-                self.m2 * self.l1 * along2,
-                self.m2 * self.g * along2,
-                self.I2 + self.m2 * self.lc2**2,
-                self.m1 * self.g * along1 + self.m2 * self.g * self.l1,
-                self.I1 + self.m1 * self.lc1**2 + self.m2 * self.l1**2,
-                self.b1,
-                self.b2,
-            ]
-        )
+        return self.phasors(m_p)[:7]
 
     def sines(self) -> FloatArray:
         """The sine parts of k1, k2 and k4: (3,), in their units.
 
         Nothing where the links are straight.
         """
-        across1, across2 = self.lc1 * np.sin(self.delta1), self.lc2 * np.sin(self.delta2)
-        return np.array(
-            [self.m2 * self.l1 * across2, self.m2 * self.g * across2, self.m1 * self.g * across1]
-        )
+        return self.phasors()[7:]
 
     def phasors(
         self, m_p: float = 0.0, x: float | None = None, y: float = 0.0, J: float = 0.0
@@ -108,22 +94,18 @@ class Arm:
         """Constants k1 … k7 and their sine parts (10,) of the arm with a payload of `m_p` kg.
 
         Its centre of mass is at `x` (the tip by default), `y` m in the frame of link 2, its
-        inertia about it is `J`.
+        inertia about it is `J`. The payload's share is that of eq. (5) against eq. (3).
         """
-        if x is None:
-            x = self.l2
-        z = payload_phasors(m_p, self.l1, complex(x, y), J, self.g)
-        k = with_payload(self.constants(), np.array([z[0], z[1], z[2].real, z[3].real, z[4].real]))
-        return np.concatenate([k, self.sines() + np.array([z[2].imag, z[4].imag, z[3].imag])])
-
-    def payload_constants(self, m_p: float) -> FloatArray:
-        """Constants z1 … z5 of a tip payload of `m_p` kg (Table 2): (5,), in kg m^2 and N m."""
-        return payload_constants(m_p, self.l1, self.l2, self.g)
-
-
-def payload_constants(m_p: float, l1: float, l2: float, g: float) -> FloatArray:
-    """Constants z1 … z5 (5,) of a payload of `m_p` kg at the tip of links `l1`, `l2` m: Table 2."""
-    return m_p * np.array([l1**2, l2**2, l1 * l2, g * l1, g * l2])
+        one, two = self.lc1 * np.exp(1j * self.delta1), self.lc2 * np.exp(1j * self.delta2)
+        at = complex(self.l2 if x is None else x, y)
+        z1, z2, z3, z4, z5 = payload_phasors(m_p, self.l1, at, J, self.g)
+        K1 = self.m2 * self.l1 * two + z3
+        K2 = self.m2 * self.g * two + z5
+        k3 = self.I2 + self.m2 * self.lc2**2 + z2
+        K4 = self.m1 * self.g * one + self.m2 * self.g * self.l1 + z4
+        k5 = self.I1 + self.m1 * self.lc1**2 + self.m2 * self.l1**2 + z1
+        along = [K1.real, K2.real, k3, K4.real, k5, self.b1, self.b2]
+        return np.array([*along, K1.imag, K2.imag, K4.imag])
 
 
 def payload_phasors(
@@ -148,13 +130,6 @@ def payload_phasors(
     """
     upright = g * m_p * complex(np.cos(turn), np.sin(turn))
     return m_p * l1**2, m_p * abs(r) ** 2 + J, m_p * l1 * r, upright * l1, upright * r
-
-
-def with_payload(k: FloatArray, z: FloatArray) -> FloatArray:
-    """Constants (7,) of the arm `k` that carries the payload `z` (5,): eq. (5) against eq. (3)."""
-    k1, k2, k3, k4, k5, k6, k7 = k
-    z1, z2, z3, z4, z5 = z
-    return np.array([k1 + z3, k2 + z5, k3 + z2, k4 + z4, k5 + z1, k6, k7])
 
 
 Moment = tuple[FloatArray, FloatArray | None]

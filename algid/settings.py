@@ -19,7 +19,7 @@ from algid.options import Option, flag
 from algid.profile import Effort, PathText, parts_of
 
 if TYPE_CHECKING:
-    from algid.signals.shift import TorqueShift
+    from algid.signals.differences import TorqueShift
 
     EstimatorName = str
 else:  # a type checker cannot read a registry
@@ -186,7 +186,7 @@ class Settings(BaseModel):
 
     def torque_shift(self, delay: float | None = None) -> TorqueShift:
         """After how long a logged torque acts: its hold, and the `delay` in s, or the one set."""
-        from algid.signals.shift import TorqueShift
+        from algid.signals.differences import TorqueShift
 
         return TorqueShift(self.torque_hold == "zoh", self.delay if delay is None else delay)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
+from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.base.limits import LIMITS
 from algid.base.names import within
 from algid.estimators.paper import STAGE1_NAMES, STAGE2_NAMES
@@ -59,7 +59,7 @@ def table4(
         k = truth.arm.constants()
         true |= sums(UNLOADED_ROWS, k)
         if payload:
-            true |= sums(LOADED_ROWS, with_payload(k, truth.arm.payload_constants(payload)))
+            true |= sums(LOADED_ROWS, truth.arm.constants(payload))
         if truth.case in case_names() and (case := load_case(truth.case)).arm == truth.arm:
             paper = case.paper_error_percent
     rows = []

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from algid.arm import Arm, FloatArray, inverse_dynamics, with_payload
+from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.log import Log, Origin, Reading
 from algid.signals.segments import Segment
 from algid.synth.cases import Case, load_case
@@ -106,7 +106,7 @@ def scene(name: str) -> Scene:
         motion = simulate(constants, lambda times: wide(times) + bias, t)
         return Truth(t, motion.theta, motion.omega, motion.tau)
 
-    loaded = with_payload(k, arm.payload_constants(case.payload))
+    loaded = arm.constants(case.payload)
     return Scene(arm, case.payload, moved(k, seed), moved(loaded, seed + 1))
 
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
+from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.base.errors import LogError
 from algid.estimators.conventions import AS_READ
 from algid.identification.identify import identify
@@ -101,7 +101,7 @@ def motion_of(name: str, *, loaded: bool = False) -> tuple[FloatArray, Simulated
     arm = case_of(name).arm
     t = np.arange(round(DURATION * RATE) + 1) / RATE
     k = arm.constants()
-    moved = with_payload(k, arm.payload_constants(0.5 * arm.m2)) if loaded else k
+    moved = arm.constants(0.5 * arm.m2) if loaded else k
     return k, simulate(moved, wide_multi_sine(arm, sum(name.encode()) + loaded), t)
 
 

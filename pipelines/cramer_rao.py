@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from algid.arm import FloatArray, forward_dynamics, payload_constants, with_payload
+from algid.arm import FloatArray, forward_dynamics
 
 _STEP = 1e-30  # complex step: derivatives exact to rounding
 
@@ -41,6 +41,11 @@ Constants = Callable[[FloatArray], FloatArray]
 """The arm's constants of parameters p, which may be complex."""
 
 
+def of_payload(m_p: float, l1: float, l2: float, gravity: float) -> FloatArray:
+    """What a payload at the tip adds to k1 … k7 (Table 2); a complex number stays one."""
+    return m_p * np.array([l1 * l2, gravity * l2, l2**2, gravity * l1, l1**2, 0.0, 0.0])
+
+
 def information(
     truth: Truth, p: FloatArray, gravity: float, sigma_theta: float, sigma_tau: float, loaded: bool
 ) -> FloatArray:
@@ -48,7 +53,7 @@ def information(
 
     def constants(q: FloatArray) -> FloatArray:
         if loaded:
-            return with_payload(q[:7], payload_constants(q[7], q[8], q[9], gravity))
+            return q[:7] + of_payload(q[7], q[8], q[9], gravity)
         return q[:7]
 
     return information_on(truth, p, constants, sigma_theta, sigma_tau)

@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 from scipy.signal import lfilter
 
-from algid.arm import FloatArray, with_payload
+from algid.arm import FloatArray
 from algid.signals.segments import Segment
 from algid.synth.excitation import wide_multi_sine
 from pipelines.accuracy_scenes import random_arm
@@ -150,8 +150,7 @@ def _moved(errors: Errors, seeds: tuple[int, ...]) -> tuple[FloatArray, FloatArr
         np.exp(np.random.default_rng(seed).uniform(np.log(0.03), np.log(0.2))) for seed, _ in pairs
     ]
     bare = np.stack([arm.constants() for arm, _ in made], axis=-1)
-    more = [arm.payload_constants(payload) for arm, payload in made]
-    k = np.stack([with_payload(own, one) for own, one in zip(bare.T, more, strict=True)], axis=-1)
+    k = np.stack([arm.constants(payload) for arm, payload in made], axis=-1)
     k[:, ::2] = bare[:, ::2]
     inertia, mass = (
         np.stack([bare[4] + bare[2], bare[2]]),

@@ -36,7 +36,7 @@ from scipy.linalg import expm
 from scipy.signal import place_poles
 from scipy.stats import binomtest, qmc
 
-from algid.arm import FloatArray, with_payload
+from algid.arm import FloatArray
 from algid.estimators.paper import columns, payload, solve_scaled, stack_rows
 from algid.signals.observers import PAPER_POLES, A, C, observer_gain
 from algid.synth.cases import Case, load_case
@@ -110,7 +110,7 @@ def shares(
 ) -> FloatArray:
     """Table 4's errors (12, B) as shares of the paper's, sign kept, read at `judged`."""
     k = case.arm.constants()
-    loaded = with_payload(k, case.arm.payload_constants(case.payload))
+    loaded = case.arm.constants(case.payload)
     tau = torques(genes, DT * np.arange(SAMPLES))
 
     def estimates(constants: FloatArray, known_k6: FloatArray | None) -> FloatArray:

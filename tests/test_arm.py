@@ -13,7 +13,6 @@ from algid.arm import (
     forward_dynamics,
     inverse_dynamics,
     read_only,
-    with_payload,
 )
 from algid.synth.cases import load_case
 from tests.exports.arms import states
@@ -58,7 +57,7 @@ def test_inverse_dynamics_is_the_lagrangian_s(
 ) -> None:
     arm = load_case(case).arm
     theta, omega, alpha = states(200)
-    k = with_payload(arm.constants(), arm.payload_constants(payload))
+    k = arm.constants(payload)
     expected = np.array(lagrangian_torque(*alpha, *omega, *theta, *physical(arm), payload))
     # rounding of sums of terms up to 1 N m
     np.testing.assert_allclose(inverse_dynamics(k, theta, omega, alpha), expected, atol=1e-12)

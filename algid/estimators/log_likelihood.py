@@ -38,9 +38,8 @@ from algid.estimators.whitening import (
     whiten,
 )
 from algid.model import Model, Motion
-from algid.signals.differences import POINTS, Stencil
+from algid.signals.differences import POINTS, Stencil, TorqueShift
 from algid.signals.segments import Segment, pieces, spread_pieces
-from algid.signals.shift import TorqueShift
 
 Beside = Callable[[Model, FloatArray, Motion, float], FloatArray]
 """Torques (m, 2, n) in N m beside those of a model at coefficients (q,), of a motion sampled every

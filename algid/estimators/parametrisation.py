@@ -8,7 +8,7 @@ c       coefficients of one log: columns, delay                         (q,)
 T       dc/dβ                                                           (q, Q)
 ======  ==============================================================  ========
 
-A loaded log obeys the same equations with the constants of `algid.arm.with_payload`, so that it
+A loaded log obeys the same equations with the constants of `algid.arm.Arm.phasors`, so that it
 informs about the arm as well as about its payload.
 """
 

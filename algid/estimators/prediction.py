@@ -33,9 +33,9 @@ from algid.estimators.elastic import flexed
 from algid.estimators.fit import Fit
 from algid.estimators.problem import Source
 from algid.model import F1, F2, Model, Motion, advanced, inertia, partials, regressor
+from algid.signals.differences import AT_ONCE, TorqueShift
 from algid.signals.filters import butterworth, correlate, smoother
 from algid.signals.segments import Segment, pieces
-from algid.signals.shift import AT_ONCE, TorqueShift
 
 _PIECE_SECONDS = 60.0
 _PER_CUTOFF = 12.5

@@ -9,8 +9,8 @@ from algid.base.progress import Progress
 from algid.estimators.combine import Prior
 from algid.estimators.parametrisation import Shared
 from algid.model import Model
+from algid.signals.differences import AT_ONCE, TorqueShift
 from algid.signals.segments import Segment
-from algid.signals.shift import AT_ONCE, TorqueShift
 
 Source = Callable[[], Iterable[Segment]]
 """A log: gives its uniform segments in time order, afresh each time."""

@@ -34,7 +34,7 @@ from algid.physics.effort import absent
 from algid.physics.signals import widths_of
 from algid.results import FitSummary, LogSummary, Result
 from algid.settings import DEFAULTS, Settings
-from algid.signals.shift import TorqueShift
+from algid.signals.differences import TorqueShift
 
 if TYPE_CHECKING:
     from algid.identification.recordings import Role

@@ -16,9 +16,9 @@ from algid.identification.recordings import Recording, Recordings
 from algid.options import flag
 from algid.physics.effort import absent
 from algid.settings import Settings
+from algid.signals.differences import TorqueShift
 from algid.signals.observers import PAPER_POLES, LuenbergerObserver
 from algid.signals.segments import Segment
-from algid.signals.shift import TorqueShift
 
 
 @contextmanager

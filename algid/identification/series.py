@@ -28,9 +28,9 @@ from algid.estimators.noise import first_guess
 from algid.estimators.prediction import CUTOFF, MOTION, scored_torque
 from algid.identification.recordings import Recordings, Role
 from algid.model import Model, Motion, inertia, torque
+from algid.signals.differences import AT_ONCE, TorqueShift
 from algid.signals.filters import half_length, smoothed
 from algid.signals.segments import Segment, pieces
-from algid.signals.shift import AT_ONCE, TorqueShift
 
 if TYPE_CHECKING:
     from algid.identification.by_likelihood import Fitted

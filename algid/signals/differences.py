@@ -17,7 +17,7 @@ Cumulative integrals of uniformly sampled signals, fourth order in the sample ti
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import factorial, floor
 
@@ -29,6 +29,26 @@ from algid.signals.filters import reflected
 POINTS = 9
 _HALF = POINTS // 2
 _NEXT = 0.25  # of a sample, before the next whole one
+
+
+@dataclass(frozen=True)
+class TorqueShift:
+    """Half a sample where the torque is `held` from each sample to the next, and a `delay` in s."""
+
+    held: bool = False
+    delay: float = 0.0
+
+    def at(self, dt: float) -> float:
+        """The time in s where samples are `dt` s apart."""
+        return (0.5 * dt if self.held else 0.0) + self.delay
+
+    def later(self, delay: float) -> TorqueShift:
+        """The same with `delay` s on top."""
+        return replace(self, delay=self.delay + delay)
+
+
+AT_ONCE = TorqueShift()
+"""A torque that acts when it is stamped, and moves evenly from sample to sample."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,14 +122,11 @@ class Stencil:
 
     def differences(self, x: FloatArray) -> FloatArray:
         """Value and two derivatives (3, 2, n) of x (2, N) where `torques` act."""
-        length = x.shape[1]
-        torques, first = self.torques(length), self.first(length)
-        n = torques.stop - torques.start
-        result = np.zeros((3, 2, n))
+        torques, first = self.torques(x.shape[1]), self.first(x.shape[1])
+        around = x[:, first : torques.stop + self.whole + _HALF]
+        result = np.empty((3, 2, max(0, torques.stop - torques.start)))
         for order, weights in enumerate(self.weights):
-            for point, weight in enumerate(weights):
-                if weight != 0.0:
-                    result[order] += weight * x[:, first + point : first + point + n]
+            result[order] = weighted(around, weights)
         return result
 
 
@@ -119,7 +136,7 @@ _SLOPE = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60
 
 def weighted(signal: FloatArray, taps: FloatArray) -> FloatArray:
     """Sums (..., N - p + 1) of each sample of a signal (..., N) and the next by `taps` (p,)."""
-    n = signal.shape[-1] - taps.size + 1
+    n = max(0, signal.shape[-1] - taps.size + 1)
     result = taps[0] * signal[..., :n]
     for place, tap in enumerate(taps[1:], start=1):
         if tap != 0.0:
@@ -171,7 +188,6 @@ def integral(signal: FloatArray, dt: float) -> FloatArray:
     steps[..., 0] = 0
     steps[..., 1] = signal[..., :4] @ _EDGE
     steps[..., -1] = signal[..., -4:] @ _EDGE[::-1]
-    steps[..., 2:-1] = _INNER[1] * (signal[..., 1:-2] + signal[..., 2:-1])
-    steps[..., 2:-1] += _INNER[0] * (signal[..., :-3] + signal[..., 3:])
+    steps[..., 2:-1] = weighted(signal, _INNER)
     steps *= dt
     return np.cumsum(steps, axis=-1, out=steps)

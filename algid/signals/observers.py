@@ -30,7 +30,6 @@ PAPER_POLES = (-80.0, -390.0, -391.0, -392.0, -393.0, -394.0)
 _CHAIN = np.diag([1.0, 1.0], 1)
 A = np.kron(np.eye(2), _CHAIN)
 C = np.eye(6)[[0, 3]]
-C_OBS = np.eye(6)[[1, 4]]
 
 
 def observer_gain(poles: tuple[complex, ...]) -> FloatArray:

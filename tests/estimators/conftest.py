@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from algid.arm import Arm, FloatArray, with_payload
+from algid.arm import Arm, FloatArray
 from algid.estimators.problem import Problem, Source
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
@@ -58,7 +58,7 @@ def problem_of(*unloaded: Segment, loaded: Sequence[Segment] = (), **known: Any)
 def bench() -> Bench:
     case = load_case("case1")
     k = case.arm.constants()
-    loaded = with_payload(k, case.arm.payload_constants(case.payload))
+    loaded = case.arm.constants(case.payload)
     t = np.arange(4001) * DT
     return Bench(
         case.arm,

@@ -11,7 +11,7 @@ import pytest
 import scipy.optimize
 from scipy.stats import chi2, norm
 
-from algid.arm import FloatArray, payload_constants, with_payload
+from algid.arm import FloatArray
 from algid.estimators import weak
 from algid.estimators.combine import LogInformation
 from algid.estimators.diagnostics import (
@@ -22,6 +22,7 @@ from algid.estimators.diagnostics import (
 from algid.estimators.fit import Fit, alone, finish
 from algid.estimators.parametrisation import Shared
 from algid.model import Model
+from pipelines.cramer_rao import of_payload
 
 from .conftest import Bench, problem_of
 
@@ -87,8 +88,8 @@ def test_the_distance_of_two_arms_is_that_of_what_no_payload_explains(bench: Ben
     whitening = np.linalg.inv(np.linalg.cholesky(bare.covariance + burdened.covariance))
 
     def left(p: FloatArray) -> FloatArray:
-        z = payload_constants(p[0], p[1], p[2], 9.81)
-        return np.asarray(whitening @ (burdened.values - with_payload(bare.values, z)))
+        share = of_payload(p[0], p[1], p[2], 9.81)
+        return np.asarray(whitening @ (burdened.values - bare.values - share))
 
     start = np.array([bench.payload, bench.arm.l1, bench.arm.l2])
     squares = 2 * scipy.optimize.least_squares(left, start, x_scale=start).cost

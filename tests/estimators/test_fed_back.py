@@ -15,8 +15,8 @@ from algid.estimators import refined
 from algid.estimators.fit import Fit
 from algid.estimators.problem import WeakSettings
 from algid.notices import has_code
+from algid.signals.differences import TorqueShift
 from algid.signals.segments import Segment
-from algid.signals.shift import TorqueShift
 from algid.synth.cases import load_case
 from pipelines.accuracy_scenes import waves
 from pipelines.simulator import Controller, Plan, controlled, inertias

@@ -12,7 +12,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 from scipy.signal import lfilter
 
-from algid.arm import CONSTANT_NAMES, FloatArray, forward_dynamics, with_payload
+from algid.arm import CONSTANT_NAMES, FloatArray, forward_dynamics
 from algid.estimators import instruments, refined, weak
 from algid.estimators.fit import Fit
 from algid.estimators.problem import WeakSettings
@@ -57,9 +57,7 @@ def term_log(
 ) -> Segment:
     """A log with SymPy's torque along an exact motion, with `noise` of the angles in rad."""
     moved = bench.burdened if loaded else bench.bare
-    k = bench.arm.constants()
-    if loaded:
-        k = with_payload(k, bench.arm.payload_constants(bench.payload))
+    k = bench.arm.constants(bench.payload if loaded else 0.0)
     alpha = forward_dynamics(k, moved.theta, moved.omega, moved.tau)
     here = {**values, **dict(zip(CONSTANT_NAMES, k.tolist(), strict=True))}
     tau = evaluated(torque_by_hand(), model, here, Motion(moved.theta, moved.omega, alpha))[:, 0]

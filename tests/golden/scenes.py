@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from algid.arm import Arm, FloatArray, forward_dynamics, with_payload
+from algid.arm import Arm, FloatArray, forward_dynamics, payload_phasors
 from algid.log import Log, Origin, Reading
 from algid.synth.cases import load_case
 from algid.synth.excitation import SampledTorque, Torque, wide_multi_sine
@@ -82,7 +82,7 @@ def open_loop(
     wide = replace(
         wide, amplitude=tuple(tuple(factor * a for a in joint) for joint in wide.amplitude)
     )
-    k = with_payload(ARM.constants(), ARM.payload_constants(payload))
+    k = ARM.constants(payload)
     size = np.sqrt(np.mean(wide(t) ** 2, axis=1, keepdims=True))
     push = disturbance(t, share * size, seed)
 
@@ -193,7 +193,8 @@ def passive(joint: int) -> Logs:
 def compensated(effort: str) -> Logs:
     """Logs without and with payload whose torque lacks the arm's weight, or all of the arm's."""
     t, k = times(), ARM.constants()
-    k_loaded = k + np.append(ARM.payload_constants(PAYLOAD), [0.0, 0.0])[:7]
+    z = np.real(payload_phasors(PAYLOAD, ARM.l1, ARM.l2, 0.0, ARM.g))
+    k_loaded = k + np.append(z, [0.0, 0.0])
     logs = []
     for seed, constants in ((0, k), (1, k_loaded)):
         motion = simulate(constants, wide_multi_sine(ARM, seed), t)

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.signal import butter, filtfilt
 
-from algid.arm import FloatArray, with_payload
+from algid.arm import FloatArray
 from algid.estimators.combine import LogInformation
 from algid.estimators.innovations import residual_sums
 from algid.estimators.prediction import score
@@ -34,7 +34,7 @@ from algid.synth.simulator import simulate
 from tests.identification.fits import CASE, K, fit_of
 
 DT = 2e-3
-LOADED_K = with_payload(K, CASE.arm.payload_constants(CASE.payload))
+LOADED_K = CASE.arm.constants(CASE.payload)
 
 
 def moved(k: FloatArray, seed: int, start_ns: int = 7_000_000_000) -> tuple[Log, FloatArray]:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import algid
-from algid.arm import FloatArray, with_payload
+from algid.arm import FloatArray
 from algid.estimators import refined
 from algid.identification.identify import identify
 from algid.log import Log
@@ -32,8 +32,7 @@ CASE = load_case("case1")
 
 @cache
 def moved(*, loaded: bool) -> SimulatedMotion:
-    k = CASE.arm.constants()
-    k = with_payload(k, CASE.arm.payload_constants(CASE.payload)) if loaded else k
+    k = CASE.arm.constants(CASE.payload if loaded else 0.0)
     return simulate(k, wide_multi_sine(CASE.arm, 3 + loaded), np.arange(2501) * DT)
 
 

@@ -18,7 +18,7 @@ from algid.identification.validate import validate
 from algid.log import Log, Origin
 from algid.model import Model
 from algid.settings import Settings
-from algid.signals.shift import TorqueShift
+from algid.signals.differences import TorqueShift
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion

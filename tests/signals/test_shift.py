@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from algid.signals.shift import AT_ONCE, TorqueShift
+from algid.signals.differences import AT_ONCE, TorqueShift
 
 
 def test_a_held_torque_acts_half_a_sample_later_and_delays_add_up() -> None:

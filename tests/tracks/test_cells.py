@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid.arm import FloatArray, with_payload
+from algid.arm import FloatArray
 from algid.base.criteria import HOLE
 from algid.base.errors import LogError
 from algid.identification.identify import identify
@@ -36,7 +36,7 @@ def carrying(mass: float) -> FloatArray:
 
 def loaded(mass: float, duration: float = 3.0, seed: int = 3) -> Log:
     """The first case's arm with `mass` kg at its tip, without noise, at 500 Hz."""
-    k = with_payload(CASE.arm.constants(), CASE.arm.payload_constants(mass))
+    k = CASE.arm.constants(mass)
     t = 2e-3 * np.arange(round(500 * duration) + 1)
     motion = simulate(k, wide_multi_sine(CASE.arm, seed), t)
     log = Log(
