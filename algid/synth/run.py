@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from algid.arm import FloatArray
 from algid.base.errors import SettingError
 from algid.base.limits import PHYSICAL
 from algid.base.progress import Progress
@@ -17,7 +16,7 @@ from algid.synth.cases import Case
 from algid.synth.excitation import Hold, SampledTorque, Torque, no_torque, wide_multi_sine
 from algid.synth.follow import Reference, follow
 from algid.synth.sensors import Sensors, record, sample_times
-from algid.synth.simulator import HANGING, SimulatedMotion, simulate
+from algid.synth.simulator import HANGING, simulate
 
 EXCITATIONS = ("case", "wide", "none")
 
@@ -82,7 +81,7 @@ def synthesise(
     SettingError
         If the times do not increase.
     """
-    runs: dict[str, Sequence[tuple[float, float]]] = {"unloaded": [(0.0, 0.0)]}
+    runs: dict[str, list[tuple[float, float]]] = {"unloaded": [(0.0, 0.0)]}
     if case.payload:
         runs["loaded"] = [(0.0, case.payload)]
     changes: tuple[tuple[float, float], ...] = ()
@@ -99,40 +98,19 @@ def synthesise(
     for place, (role, payloads) in enumerate(runs.items()):
         sensors = replace(recording.sensors, seed=recording.sensors.seed + place)
         t = sample_times(recording.rate, recording.duration, sensors)
-        motion = _moved(case, drive, recording, t, payloads, _counted(progress, role, recording))
-        mass = 0.0 if changes else payloads[0][1]
+        reached, mass = _counted(progress, role, recording), payloads[0][1]
+        if isinstance(drive, Reference):
+            k, tuned = case.constants(mass), case.constants(0.0)
+            motion = follow(k, drive, t, tuned, bool(mass), reached)
+        else:
+            state, since = np.array(recording.initial), [time for time, _ in payloads[1:]]
+            k = case.constants(mass)
+            if changes:
+                k = np.stack([case.constants(carried) for _, carried in payloads], axis=-1)
+            motion = simulate(k, drive, t, state[:2], state[2:], reached, since)
         truth = Truth(case.arm, mass, case.name, changes)
         logs.append(record(motion, sensors, truth, f"{case.name}-{role}"))
     return logs
-
-
-def _moved(
-    case: Case,
-    drive: Torque | Reference,
-    recording: Acquisition,
-    t: FloatArray,
-    payloads: Sequence[tuple[float, float]],
-    reached: Callable[[float], None] | None,
-) -> SimulatedMotion:
-    """The arm's motion at `t` (N,), part by part with each payload from its time on."""
-    state, parts = np.array(recording.initial), []
-    edges = np.clip([*(time for time, _ in payloads), np.inf], 0.0, t[-1])
-    for (_, mass), start, end in zip(payloads, edges, edges[1:], strict=False):
-        if end <= start:
-            continue
-        every = np.unique(np.concatenate([[start], t[(t > start) & (t < end)], [end]]))
-        k = case.constants(mass)
-        if isinstance(drive, Reference):
-            motion = follow(k, drive, every, case.constants(0.0), bool(mass), reached)
-        else:
-            motion = simulate(k, drive, every, state[:2], state[2:], reached)
-        rows = np.concatenate([motion.theta, motion.omega, motion.tau])
-        state = rows[:4, -1]
-        # a sample at the change is the first one with the payload
-        own = np.isin(every, t) & ((every < end) | (end == t[-1]))
-        parts.append(rows[:, own])
-    signals = np.concatenate(parts, axis=1)
-    return SimulatedMotion(t, signals[:2], signals[2:4], signals[4:])
 
 
 def _counted(

@@ -13,7 +13,7 @@ tau     joint torques                 (2, N)  N m
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,18 +46,22 @@ def simulate(
     theta0: FloatArray = HANGING,
     omega0: FloatArray | None = None,
     reached: Callable[[float], None] | None = None,
+    since: Sequence[float] = (),
 ) -> SimulatedMotion:
     """Move an arm by torques.
 
     Parameters
     ----------
-    k : (7,) float64, constants k1 … k7, with the payload's share where there is one
+    k : (7,) float64, constants k1 … k7, with the payload's share where there is one; or (7, P), of
+        P payloads one after the other
     torque : callable (M,) s -> (2, M) N m
     t : (N,) float64, s, increasing, at least two
     theta0 : (2,) float64, rad, at `t[0]`; hanging by default
     omega0 : (2,) float64, rad/s, at `t[0]`; at rest by default
     reached : callable
         Called with each time in s that the integration has come to.
+    since : (P - 1,) float, s, increasing
+        When each payload takes the place of the one before.
 
     Returns
     -------
@@ -90,8 +94,10 @@ def simulate(
         tau = torque(times)
         return lambda _theta, _omega: tau
 
-    corners = torque.t if isinstance(torque, SampledTorque) else None
-    return steered(k, driven, t, theta0, corners, reached, omega0)
+    corners = torque.t if isinstance(torque, SampledTorque) else np.zeros(0)
+    if len(since):
+        corners = np.unique(np.append(corners, since))
+    return steered(k, driven, t, theta0, corners, reached, omega0, since)
 
 
 def steered(
@@ -102,6 +108,7 @@ def steered(
     corners: FloatArray | None = None,
     reached: Callable[[float], None] | None = None,
     omega0: FloatArray | None = None,
+    since: Sequence[float] = (),
 ) -> SimulatedMotion:
     """Move the arm `k` by a torque that depends on time and state.
 
@@ -125,8 +132,10 @@ def steered(
         k = k[:7]  # a straight arm takes fewer operations
 
     def accelerate_at(times: FloatArray) -> Acceleration:
-        torque = controller(times)
-        return lambda theta, omega: forward_dynamics(k, theta, omega, torque(theta, omega))
+        torque, own = controller(times), k
+        if len(since):
+            own = k[:, np.searchsorted(since, times, side="right")]
+        return lambda theta, omega: forward_dynamics(own, theta, omega, torque(theta, omega))
 
     try:
         states = integrate(accelerate_at, start, t, corners, reached)

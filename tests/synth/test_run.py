@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid.arm import Arm, FloatArray, inverse_dynamics, with_payload
+from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.base.errors import SettingError
 from algid.synth.cases import Case
 from algid.synth.excitation import MultiSine
@@ -25,10 +25,6 @@ WAVE = MultiSine(((4.0,), (1.5,)), ((0.7,), (1.1,)), ((0.0,), (0.4,)))
 SHORT = Acquisition(rate=100.0, duration=0.6, initial=(-1.0, 0.3, 0.5, -0.2))
 
 
-def loaded_constants(mass: float) -> FloatArray:
-    return with_payload(ARM.constants(), ARM.payload_constants(mass))
-
-
 def test_an_object_is_grasped_and_let_go_without_a_step() -> None:
     schedule = [(0.2, 0.5), (0.405, 0.0)]  # on a sample, and between two
     (log,) = synthesise(CASE, WAVE, SHORT, schedule=schedule)
@@ -38,7 +34,7 @@ def test_an_object_is_grasped_and_let_go_without_a_step() -> None:
     for (start, end), mass in zip(pairwise(places), (0.0, 0.5, 0.0), strict=True):
         own = t[(t >= start - 1e-9) & (t < end - 1e-9)]
         every = np.unique(np.concatenate([[start], own, [end]]))
-        motion = simulate(loaded_constants(mass), WAVE, every, state[:2], state[2:])
+        motion = simulate(ARM.constants(mass), WAVE, every, state[:2], state[2:])
         np.testing.assert_allclose(
             log.theta[:, np.isin(t, own)], motion.theta[:, np.isin(every, own)], atol=1e-10
         )
@@ -89,7 +85,7 @@ def plan_of(k: FloatArray, loaded: FloatArray, amplitude: float = 0.4) -> Refere
 
 
 def test_an_arm_that_is_as_believed_follows_its_plan() -> None:
-    plan = plan_of(ARM.constants(), loaded_constants(0.5))
+    plan = plan_of(ARM.constants(), ARM.constants(0.5))
     logs = synthesise(CASE, plan, Acquisition(rate=400.0, duration=1.0))
     assert [log.origin.path for log in logs] == ["mine-unloaded", "mine-loaded"]
     for log, torque in zip(logs, (plan.tau, plan.loaded_tau), strict=True):
