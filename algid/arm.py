@@ -107,6 +107,10 @@ class Arm:
         along = [K1.real, K2.real, k3, K4.real, k5, self.b1, self.b2]
         return np.array([*along, K1.imag, K2.imag, K4.imag])
 
+    def payload_constants(self, m_p: float) -> FloatArray:
+        """Constants z1 … z5 of a tip payload of `m_p` kg (Table 2): (5,), in kg m^2 and N m."""
+        return np.real(payload_phasors(m_p, self.l1, self.l2, 0.0, self.g))
+
 
 def payload_phasors(
     m_p: float, l1: float, r: complex, J: float, g: float, turn: float = 0.0

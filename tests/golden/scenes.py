@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from algid.arm import Arm, FloatArray, forward_dynamics, payload_phasors
+from algid.arm import Arm, FloatArray, forward_dynamics
 from algid.log import Log, Origin, Reading
 from algid.synth.cases import load_case
 from algid.synth.excitation import SampledTorque, Torque, wide_multi_sine
@@ -193,8 +193,7 @@ def passive(joint: int) -> Logs:
 def compensated(effort: str) -> Logs:
     """Logs without and with payload whose torque lacks the arm's weight, or all of the arm's."""
     t, k = times(), ARM.constants()
-    z = np.real(payload_phasors(PAYLOAD, ARM.l1, ARM.l2, 0.0, ARM.g))
-    k_loaded = k + np.append(z, [0.0, 0.0])
+    k_loaded = k + np.append(ARM.payload_constants(PAYLOAD), [0.0, 0.0])[:7]
     logs = []
     for seed, constants in ((0, k), (1, k_loaded)):
         motion = simulate(constants, wide_multi_sine(ARM, seed), t)
