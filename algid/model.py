@@ -290,15 +290,14 @@ def _compiled(terms: tuple[str, ...], gravity: bool, by_torque: bool) -> Compile
 
 def summed(weighted: Weighted, c: FloatArray, values: Values) -> FloatArray | float:
     """The value of an expression that is linear in the coefficients `c` (q,) or (q, N)."""
-    total: FloatArray | float = 0.0
     known = c.tolist() if c.ndim == 1 else c  # Python's numbers are faster than NumPy's
+    factors = {}
     for product, pairs in weighted.items():
-        coefficient = 0.0
+        total = 0.0
         for place, factor in pairs:
-            coefficient = coefficient + factor * known[place]
-        if isinstance(coefficient, np.ndarray) or coefficient:
-            total = total + coefficient * values.of(product)
-    return total
+            total = total + factor * known[place]
+        factors[product] = total
+    return values.sum(factors)
 
 
 def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> FloatArray:

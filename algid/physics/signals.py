@@ -34,23 +34,15 @@ Number = int | float
 
 @dataclass(frozen=True, eq=False)
 class Atom:
-    """A signal of a motion or one over a width; or a function of an expression of these.
+    """A signal of a motion or one over a width, which every exported function is handed.
 
     Parameters
     ----------
     name : str
         What it is called in exported sources.
-    function : NumPy's function, whose name C and Python have too, or None
-    argument : Expression
-        What it is a function of.
-    slope : callable
-        Its derivative by its argument. Called late: cosines derive from sines, and back.
     """
 
     name: str
-    function: np.ufunc | None = None
-    argument: Expression | None = None
-    slope: Callable[[], Expression] | None = None
 
     def __lt__(self, other: Atom) -> bool:
         return self.name < other.name
@@ -58,21 +50,46 @@ class Atom:
     @property
     def source(self) -> str:
         """Its text, which C and Python read alike; "" for what every function is handed."""
-        if self.function is None or self.argument is None:
-            return ""
-        return f"{self.function.__name__}({self.argument.source()})"
+        return ""
 
-    @cached_property
+    @property
     def leaves(self) -> frozenset[Atom]:
         """The signals and widths that it depends on."""
-        return frozenset([self]) if self.argument is None else self.argument.leaves
+        return frozenset([self])
 
     def by(self, leaf: Atom) -> Expression:
         """Its derivative by a signal."""
-        if self is leaf:
-            return ONE
-        if leaf not in self.leaves or self.argument is None or self.slope is None:
-            return NOTHING
+        return ONE if self is leaf else NOTHING
+
+
+@dataclass(frozen=True, eq=False)
+class Function(Atom):
+    """A function of an expression.
+
+    Parameters
+    ----------
+    function : NumPy's function, whose name C and Python have too
+    argument : Expression
+    slope : callable
+        Its derivative by its argument. Called late: cosines derive from sines, and back.
+    """
+
+    function: np.ufunc
+    argument: Expression
+    slope: Callable[[], Expression]
+
+    @property
+    def source(self) -> str:
+        """Its text: the function of the argument's."""
+        return f"{self.function.__name__}({self.argument.source()})"
+
+    @property
+    def leaves(self) -> frozenset[Atom]:
+        """The signals and widths in its argument."""
+        return self.argument.leaves
+
+    def by(self, leaf: Atom) -> Expression:
+        """Its derivative by a signal, by the chain rule."""
         return self.slope() * self.argument.by(leaf)
 
 
@@ -185,8 +202,7 @@ ALPHA = (Atom("alpha1"), Atom("alpha2"))
 MOTION = (THETA, OMEGA, ALPHA)
 """By the order of θ's derivative: each pair is the one before derived by time."""
 
-Q1, Q2 = map(as_expression, THETA)
-W1, W2 = map(as_expression, OMEGA)
+Q1, Q2, W1, W2, A1, A2 = map(as_expression, chain(*MOTION))
 
 
 def function(
@@ -195,8 +211,8 @@ def function(
     argument: Expression,
     slope: Callable[[], Expression],
 ) -> Expression:
-    """A function of an expression: see `Atom`."""
-    return as_expression(Atom(name, function, argument, slope))
+    """A function of an expression: see `Function`."""
+    return as_expression(Function(name, function, argument, slope))
 
 
 S1: Expression = function("s1", np.sin, Q1, lambda: C1)
@@ -205,8 +221,9 @@ S2: Expression = function("s2", np.sin, Q2, lambda: C2)
 C2: Expression = function("c2", np.cos, Q2, lambda: -S2)
 S12: Expression = function("s12", np.sin, Q1 + Q2, lambda: C12)
 C12: Expression = function("c12", np.cos, Q1 + Q2, lambda: -S12)
-TRIGONOMETRY = (S1, C1, S2, C2, S12, C12)
-"""As `Motion.trigonometry` has their values."""
+_KNOWN = (ONE, Q1, Q2, W1, W2, A1, A2, S1, C1, S2, C2, S12, C12)
+KNOWN = [product for known in _KNOWN for product in known.products]
+"""The products of one atom or none as `Motion.signals` has their values."""
 
 _RATE = as_expression(WIDTHS["coulomb_speed"])
 T1: Expression = function("t1", np.tanh, W1 * _RATE, lambda: 1 - T1 * T1)
@@ -239,10 +256,11 @@ class Motion:
     load: FloatArray | None = None
 
     @cached_property
-    def trigonometry(self) -> tuple[FloatArray, ...]:
-        """Sine and cosine of θ1, of θ2 and of θ1 + θ2, each (N,)."""
+    def signals(self) -> tuple[FloatArray | float, ...]:
+        """1, its rows, then sine and cosine of θ1, of θ2 and of θ1 + θ2, each (N,)."""
         (s1, s2), (c1, c2) = sine_cosine(self.theta)
-        return s1, c1, s2, c2, s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
+        both = s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
+        return 1.0, *self.theta, *self.omega, *self.alpha, s1, c1, s2, c2, *both
 
 
 def sine_cosine(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -268,30 +286,27 @@ class Values:
     """
 
     def __init__(self, motion: Motion, widths: Widths) -> None:
-        self._known: dict[Product, FloatArray | float] = {(): 1.0}
+        self._known: dict[Product, FloatArray | float]
+        self._known = dict(zip(KNOWN, motion.signals, strict=True))
         for name, width in widths_of(widths).items():
             self._known[(WIDTHS[name],)] = 1 / width
-        for atoms, signals in zip(MOTION, (motion.theta, motion.omega, motion.alpha), strict=True):
-            self._known |= {(atom,): signal for atom, signal in zip(atoms, signals, strict=True)}
-        for e, signal in zip(TRIGONOMETRY, motion.trigonometry, strict=True):
-            self._known |= dict.fromkeys(e.products, signal)
 
     def of(self, product: Product) -> FloatArray | float:
         """The value of a product (N,); a float where no motion changes it."""
         if product not in self._known:
-            *before, last = product
-            if before:
-                value = self.of(tuple(before)) * self.of((last,))
+            last = product[-1]
+            if len(product) > 1:
+                value = self.of(product[:-1]) * self.of((last,))
             else:
-                assert last.function is not None
-                assert last.argument is not None
-                value = last.function(self.sum(last.argument))
+                assert isinstance(last, Function)  # all else is known
+                value = last.function(self.sum(last.argument.products))
             self._known[product] = value
         return self._known[product]
 
-    def sum(self, e: Expression) -> FloatArray | float:
-        """The value of an expression (N,), or a float."""
+    def sum(self, products: Mapping[Product, FloatArray | float]) -> FloatArray | float:
+        """The value (N,) of a sum of products with factors (N,) or none, or a float."""
         total: FloatArray | float = 0.0
-        for product, factor in e.products.items():
-            total = total + factor * self.of(product)
+        for product, factor in products.items():
+            if isinstance(factor, np.ndarray) or factor:
+                total = total + factor * self.of(product)
         return total

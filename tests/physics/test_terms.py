@@ -110,7 +110,7 @@ def test_an_expression_its_sum_and_its_source_are_one_number(one: float, two: fl
     e, motion = one * S1 * W2 + two * C12 - two, moving(0.05)
     (q1, q2), (_, w2) = motion.theta, motion.omega
     expected = one * np.sin(q1) * w2 + two * np.cos(q1 + q2) - two
-    value = Values(motion, Widths()).sum(e)
+    value = Values(motion, Widths()).sum(e.products)
     known = {"s1": np.sin(q1), "w2": w2, "c12": np.cos(q1 + q2)}
     for found in (value, eval(e.source(), known)):
         np.testing.assert_allclose(found, expected, atol=1e-14)
