@@ -58,17 +58,12 @@ from algid.model import (
     without_delay,
 )
 from algid.physics.effort import ELASTIC
-from algid.physics.signals import WIDTHS
+from algid.physics.signals import TRIED, WIDTHS
 from algid.signals.segments import pieces, spread_pieces
 
 CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and not term.lags)
 """Terms that the logs choose from; one column serves lag and delay, equal to first order."""
 _LAG = tuple(name for name, term in EVERY_TERM.items() if term.lags)
-_STARTS = {
-    "coulomb_speed": np.array([0.01, 0.02, 0.04, 0.08, 0.16, 0.32]),
-    "stribeck_speed": np.array([0.1, 0.3, 0.9]),
-}
-"""rad/s: widths of friction that windows are tried with; drives' lie between."""
 _MOST_LOGS = 8
 """Logs of a kind, evenly spread, that are looked at: terms are those of the arm, not of a log."""
 _PIECES, _PIECE_SAMPLES = 4, 16384
@@ -206,14 +201,14 @@ def _start(
             raise TooShortError(f"no {OF_A_WINDOW}")
         return cost, at
 
-    for shape, values in _STARTS.items():
+    for shape, values in TRIED.items():
         using = _using(shape)
         if not using:
             continue
         terms = firsts if set(using) & set(firsts) else firsts + using[:1]
         costs = []
         for value in values:
-            trial = replace(model, **{shape: float(value)})  # type: ignore[arg-type]
+            trial = replace(model, **{shape: value})  # type: ignore[arg-type]
             costs.append(solved(replace(trial, terms=terms))[0])
         best = float(np.exp(_lowest(np.log(values), costs)))
         model = replace(model, **{shape: best})  # type: ignore[arg-type]

@@ -187,6 +187,11 @@ class Widths:
     stribeck_speed: float = 0.3
 
 
+TRIED = {
+    "coulomb_speed": (0.01, 0.02, 0.04, 0.08, 0.16, 0.32),
+    "stribeck_speed": (0.1, 0.3, 0.9),
+}
+"""rad/s: the values of each width that logs are tried with; drives' lie between."""
 WIDTHS = {one.name: Atom(f"(1 / {one.name.upper()})") for one in fields(Widths)}
 """One over each width, by the width's name."""
 
