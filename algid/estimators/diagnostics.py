@@ -32,7 +32,7 @@ from algid.estimators.combine import (
     scaled_pinv,
     scores_of,
 )
-from algid.estimators.fit import Fit, Status, alone
+from algid.estimators.fit import Fit, alone
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Normal
@@ -217,9 +217,7 @@ def constrained(fit: Fit) -> Fit:
                 Notice("BROKEN_BOUND", numbers={"case": "active", "bounds": _named(enforced)})
             )
     note = Notice("BROKEN_BOUND", numbers={"case": "infeasible", "bounds": _named(disobeyed)})
-    after: dict[str, Status] = {"OK": "NOT_CONVERGED"}
-    status = tuple(after.get(word, "NOT_IDENTIFIABLE") for word in fit.status)
-    return replace(fit, converged=False, status=status).noted(note)
+    return replace(fit.marked("NOT_CONVERGED"), converged=False).noted(note)
 
 
 def _named(bounds: Sequence[BrokenBound]) -> list[str]:

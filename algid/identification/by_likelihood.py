@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -12,12 +13,12 @@ from algid.base.names import outside, within
 from algid.base.significance import SURE
 from algid.estimators import robust
 from algid.estimators.body import averaged_over_bodies, with_body
-from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import constrained
 from algid.estimators.excitation import undriven
 from algid.estimators.fit import Fit, solved_anew
 from algid.estimators.hold import Hold
 from algid.estimators.misfit import TERM_OF
+from algid.estimators.problem import Problem
 from algid.estimators.terms import (
     CHOICE,
     Selection,
@@ -26,7 +27,7 @@ from algid.estimators.terms import (
     revised,
     select,
 )
-from algid.identification.known import model_of
+from algid.identification.known import model_of, prior_of
 from algid.identification.passes import long_enough, problem_of
 from algid.identification.recordings import Recordings
 from algid.methods import estimator_of
@@ -93,7 +94,7 @@ def choose_model(
         with long_enough(survey):
             chosen = _by_first_pass(survey, settings, hold)
             late = chosen.late
-            by_logs &= chosen.model.lag_name is None and not (chosen.refuted and settings.chooses)
+            by_logs &= not (chosen.refuted and settings.chooses)
             if by_logs and late is not None:
                 hold, hold_by = late.hold, "logs"
                 if hold == "zoh":
@@ -131,9 +132,12 @@ def _given(model: Model, terms: Sequence[str]) -> Selection:
 
 
 def run_fit(
-    survey: Recordings, settings: Settings, chosen: Selection, prior: Prior | None
+    survey: Recordings,
+    settings: Settings,
+    earlier: Result | None = None,
+    file: str | None = None,
 ) -> Fitted:
-    """Fit the settings' estimator to logs.
+    """Fit the settings' estimator to logs, with the terms that they choose.
 
     Where its likelihood is refuted, every term shrunk: see `robust`.
 
@@ -142,21 +146,26 @@ def run_fit(
     survey : Recordings
         Of the logs; its `progress` is called with the refined estimator's steps too.
     settings : Settings
-    chosen : Selection
-        The torque's model, and whether a delay is estimated.
-    prior : Prior
-        What is known of the arm beforehand.
+    earlier : Result
+        What is known of the arm beforehand; where it is wrong, its `file` is named.
 
     Raises
     ------
     LogError
         If no log is long enough.
     """
+    survey.begin("choosing terms")
+    chosen = choose_model(survey, settings, earlier)
+    prior = None if earlier is None else prior_of(earlier, chosen.model, file)
+    survey.begin("fitting")
+    problem = partial(problem_of, survey, settings, prior=prior)
     estimate = estimator_of(settings.estimator).fit
 
-    def most_likely(chosen: Selection, settings: Settings) -> tuple[Fit, Selection]:
+    def most_likely(
+        chosen: Selection, given: Callable[[Selection], Problem]
+    ) -> tuple[Fit, Selection]:
         """The fit of the chosen terms, or of those that its own likelihood chooses."""
-        fit = estimate(problem_of(survey, settings, chosen, prior))
+        fit = estimate(given(chosen))
         better, other = fit, chosen
         for _ in range(_REVISIONS):
             # its own likelihood has noise levels that the first pass lacked
@@ -166,7 +175,7 @@ def run_fit(
             again = revised(other, better.products, settings.terms, nothing)
             if (again.model.terms, again.delay) == (other.model.terms, other.delay):
                 break
-            other, better = again, estimate(problem_of(survey, settings, again, prior))
+            other, better = again, estimate(given(again))
             if not better.refuted:
                 fit, chosen = better, other
             elif not fit.refuted:
@@ -179,11 +188,12 @@ def run_fit(
         if chosen.refuted and settings.chooses and settings.estimator == "refined":
             notes = (Notice("REFUTED", numbers={"case": "noise", "kept": "weak"}),)
         else:
-            fit, chosen = most_likely(chosen, settings)
+            fit, chosen = most_likely(chosen, problem)
             if fit.refuted and _is_doubtful(fit):
                 # wrong lengths refute a likelihood that holds with any others: checks see them by
                 # the one that holds
-                free, other = most_likely(chosen, settings.but(l1=None, l2=None))
+                without = settings.but(l1=None, l2=None)
+                free, other = most_likely(chosen, partial(problem_of, survey, without, prior=prior))
                 if not free.refuted:
                     shared = replace(free.shared, lengths=settings.lengths, body=())
                     fit, chosen = solved_anew(free, shared, free.prior, None), other
@@ -191,12 +201,14 @@ def run_fit(
                 notes = fit.notes
         picked = chosen
         if notes:
-            fit, chosen = _shrunk(notes, survey, settings, chosen, prior)
+            fit, chosen = _shrunk(notes, chosen, problem)
         else:  # the fit has estimated the width of friction's step
             chosen = replace(chosen, model=fit.shared.model)
-        fit, chosen = _of_motorless(fit, chosen, survey, settings, picked, prior)
+        passive = any(log.origin.reading.passive for log in survey.logs)
+        if settings.estimator == "refined" and passive and not survey.loaded:
+            fit, chosen = _of_motorless(fit, chosen, picked, settings.terms, problem)
         if fit.estimator == "instruments" and not chosen.shrunk:
-            fit = robust.with_feedback_noted(fit, problem_of(survey, settings, chosen))
+            fit = robust.with_feedback_noted(fit, problem(chosen))
     fit = finished(fit, settings)
     return Fitted(fit, survey, settings.but(torque_hold=chosen.hold), chosen)
 
@@ -230,21 +242,17 @@ _ZERO = "left out: the fit finds it to be zero within its error"
 def _of_motorless(
     fit: Fit,
     chosen: Selection,
-    survey: Recordings,
-    settings: Settings,
     picked: Selection,
-    prior: Prior | None,
+    asked: Sequence[str],
+    problem: Callable[[Selection], Problem],
 ) -> tuple[Fit, Selection]:
     """The fit by instruments, where least squares leaves open what a joint without a motor does.
 
-    It has the most common of the terms that were `picked`: the others, and the hold, were judged
-    beside constants near nothing. Unchanged where least squares determines them, or instruments do
-    not either.
+    It has the most common of the terms that were `picked`, and those that were `asked` for: the
+    others, and the hold, were judged beside constants near nothing. Unchanged where least squares
+    determines them, or instruments do not either.
     """
-    passive = any(log.origin.reading.passive for log in survey.logs)
-    if settings.estimator != "refined" or survey.loaded or not passive:
-        return fit, chosen
-    if undriven(fit, problem_of(survey, settings, picked)) is None:
+    if undriven(fit, problem(picked)) is None:
         return fit, chosen
     terms = picked.model.terms
     if picked.chosen_by == "logs":
@@ -253,7 +261,7 @@ def _of_motorless(
     plainer = replace(picked.without(dropped, _BY_NOTHING), delay=False, late=None)
     if plainer.hold_by == "logs":
         plainer = replace(plainer, hold="foh")
-    better = robust.of_passive_joint(problem_of(survey, settings, plainer, prior))
+    better = robust.of_passive_joint(problem(plainer))
     if better is None:
         return fit, chosen
     if plainer.chosen_by != "logs":
@@ -262,10 +270,10 @@ def _of_motorless(
     evident = {
         TERM_OF[name] for name, size in zip(better.names, sizes, strict=True) if size >= SURE
     }
-    nothing = outside(plainer.model.terms, evident.union(settings.terms))
+    nothing = outside(plainer.model.terms, evident.union(asked))
     if nothing:
         poorer = plainer.without(nothing, _ZERO)
-        without = robust.of_passive_joint(problem_of(survey, settings, poorer, prior))
+        without = robust.of_passive_joint(problem(poorer))
         if without is not None:
             return without, poorer
     return better, plainer
@@ -275,11 +283,7 @@ _SHRUNK = "kept and shrunk: where the likelihood is refuted no term is chosen"
 
 
 def _shrunk(
-    notes: tuple[Notice, ...],
-    survey: Recordings,
-    settings: Settings,
-    chosen: Selection,
-    prior: Prior | None,
+    notes: tuple[Notice, ...], chosen: Selection, problem: Callable[[Selection], Problem]
 ) -> tuple[Fit, Selection]:
     """The fit with every term shrunk, and its model; `notes` say why no other stands."""
     # where the first pass is refuted more than elastic joints is amiss, which they would take up
@@ -291,7 +295,7 @@ def _shrunk(
     if chosen.hold_by == "logs":
         # else by a likelihood that does not hold: a term takes up the delay
         shrunken = replace(shrunken, hold="foh")
-    fit = robust.fit(problem_of(survey, settings, shrunken, prior))
+    fit = robust.fit(problem(shrunken))
     terms = fit.shared.model.terms + (DELAYS if fit.shared.delay else ())
     trials = tuple(TermTrial(term, True, np.nan, _SHRUNK) for term in terms)
     shrunken = replace(shrunken, model=fit.shared.model, delay=fit.shared.delay, trials=trials)

@@ -102,8 +102,10 @@ def remarks(found: Fitted) -> Iterator[Notice]:
 
 def exchanged(fit: Fit) -> float | None:
     """By how many standard deviations the unloaded arm carries more, if by far."""
-    far = {one.bound: one.distance for one in broken_bounds(fit) if (one.distance or 0.0) > FAR}
-    return far.get("m_p >= 0")
+    for broken in broken_bounds(fit):
+        if broken.bound == "m_p >= 0" and (broken.distance or 0.0) > FAR:
+            return broken.distance
+    return None
 
 
 def _of_passive_joint(found: Fitted) -> Iterator[Notice]:
@@ -212,10 +214,11 @@ def _of_payload(found: Fitted) -> Iterator[Notice]:
     if "m_p" not in fit.names:
         return
     low, high = fit.ci95[fit.names.index("m_p")].tolist()
-    if np.isfinite(high) and low < 0 < high:
+    if np.isinf(high):
+        if not fit.shared.lengths:
+            yield Notice("LENGTHS_NEEDED")
+    elif low < 0 < high:
         yield Notice("NO_PAYLOAD", numbers={"most": high})
-    elif np.isinf(high) and not fit.shared.lengths:
-        yield Notice("LENGTHS_NEEDED")
 
 
 def _of_length(found: Fitted) -> Iterator[Notice]:
@@ -335,7 +338,7 @@ def fit_notes(fit: results.FitSummary) -> Iterator[Notice]:
 
 def _of_hold(hold: results.TorqueHold) -> Iterator[Notice]:
     """That logs show a held torque, or leave it open."""
-    if hold.told is None or hold.half is None:
+    if hold.half is None:  # nothing was asked of the logs
         return
     if hold.faster:
         known = Remedy({"delay": None}, "half of the controller's period, in s")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from algid.arm import CONSTANT_NAMES
 from algid.base.errors import SettingError
@@ -16,7 +16,6 @@ from algid.estimators.paper import SHORTEST
 from algid.identification.by_paper import run_paper
 from algid.identification.known import (
     contradictions,
-    prior_of,
     read_otherwise,
     reused,
     torque_constants,
@@ -38,15 +37,13 @@ from algid.results import Result, read_result, write_result
 from algid.settings import DEFAULTS, OF_BOTH, OF_PRIOR, Settings
 
 if TYPE_CHECKING:
-    from algid.identification.by_likelihood import Fitted
     from algid.notices import Notice
 
 # the paper's convergence series is drawn beside other estimators up to this length of log
 SERIES_SECONDS = 600.0
 
 
-@dataclass(frozen=True)
-class Earlier:
+class Earlier(NamedTuple):
     """A result to start from, and what to call it where it is wrong: its file, or its log."""
 
     result: Result
@@ -229,20 +226,21 @@ def _by_likelihood(
     folder: Path | None,
 ) -> Result:
     """The result of the logs, its settings with the effort that they show."""
+    from algid.identification.by_likelihood import run_fit
     from algid.identification.checks import by_free_lengths, doubted, of_effort, turn_note
     from algid.identification.outcome import outcome_of
     from algid.identification.prior import statement_of, with_prior
 
-    said = statement_of(settings)
+    said, known = statement_of(settings), earlier or ()
     # the terms that the logs choose, their fit, and what makes it doubtful
-    first = _fitted(survey, settings, earlier)
+    first = run_fit(survey, settings, *known)
     found = doubted(first)
     # the effort that it shows, and the fit of that; of constants in doubt no weight is missed
     of_driver: list[Notice] = []
     if found is first:
         shown, of_driver = of_effort(found.fit, settings)
         if shown != settings:
-            found = doubted(_fitted(survey, shown, earlier))
+            found = doubted(run_fit(survey, shown, *known))
     found = by_free_lengths(found)
     # what CAD or an earlier result says beside the logs
     if said is not None:
@@ -278,16 +276,3 @@ def _by_likelihood(
         by_paper = run_paper(survey, found.settings, None, folder)
         result = result.model_copy(update={"paper_payload": by_paper.payload})
     return result
-
-
-def _fitted(survey: Recordings, settings: Settings, earlier: Earlier | None) -> Fitted:
-    """The fit with the terms that the logs choose."""
-    from algid.identification.by_likelihood import choose_model, run_fit
-
-    survey.begin("choosing terms")
-    chosen = choose_model(survey, settings, None if earlier is None else earlier.result)
-    prior = None
-    if earlier is not None:
-        prior = prior_of(earlier.result, chosen.model, earlier.file)
-    survey.begin("fitting")
-    return run_fit(survey, settings, chosen, prior)

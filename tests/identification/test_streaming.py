@@ -11,7 +11,7 @@ import pytest
 import algid
 from algid.arm import FloatArray
 from algid.identification import recordings as surveys
-from algid.identification.by_likelihood import choose_model, run_fit
+from algid.identification.by_likelihood import run_fit
 from algid.identification.by_paper import run_paper
 from algid.identification.outcome import judged, outcome_of
 from algid.identification.recordings import Recording, Recordings
@@ -48,8 +48,7 @@ def estimates(log: Recording, settings: Settings) -> tuple[FloatArray, FloatArra
         result = judged(run_paper(survey, settings), survey)
         values = np.array([one.estimate for one in result.parameters.values()], dtype=np.float64)
         return values, 1e-9 * np.abs(values), result  # condition numbers to 1e6, times rounding
-    chosen = choose_model(survey, settings)
-    found = run_fit(survey, settings, chosen, None)
+    found = run_fit(survey, settings)
     fit = found.fit
     assert fit.converged
     # A window or sample lost at a seam moves an estimate by 1e-4 of its deviation or more;
