@@ -23,7 +23,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.base.names import by_name, names_in, outside, within
+from algid.base.names import by_name, named_values, names_in, outside, within
 from algid.physics.parameters import BODY, PAYLOAD, Parameter
 from algid.physics.signals import (
     ALPHA,
@@ -163,7 +163,7 @@ class Model(Widths):
 
     def values(self, c: FloatArray) -> dict[str, float]:
         """Coefficients of all `COLUMN_NAMES` by name: zero where a column is switched off."""
-        return dict.fromkeys(COLUMN_NAMES, 0.0) | dict(zip(self.names, c.tolist(), strict=True))
+        return dict.fromkeys(COLUMN_NAMES, 0.0) | named_values(self.names, c)
 
 
 def without_delay(terms: Iterable[str]) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.base.limits import LIMITS
-from algid.base.names import within
+from algid.base.names import named_values, within
 from algid.estimators.paper import STAGE1_NAMES, STAGE2_NAMES
 from algid.log import Truth
 from algid.model import UNITS as PARAMETER_UNITS
@@ -30,7 +30,7 @@ UNITS = {
 
 def sums(rows: Rows, k: FloatArray) -> dict[str, float]:
     """The rows of an arm's, or of a loaded arm's, constants (7,)."""
-    value = dict(zip(CONSTANT_NAMES, k.tolist(), strict=True))
+    value = named_values(CONSTANT_NAMES, k)
     return {row: sum(map(value.__getitem__, names)) for row, names in rows.items()}
 
 
@@ -38,7 +38,7 @@ def true_parameters(truth: Truth | None, payload: float | None) -> dict[str, flo
     """True k1 … k7 of a synthetic log's arm, with m_p, l1 and l2 if there is a `payload` in kg."""
     if truth is None:
         return {}
-    constants = dict(zip(CONSTANT_NAMES, truth.arm.constants().tolist(), strict=True))
+    constants = named_values(CONSTANT_NAMES, truth.arm.constants())
     if not payload:
         return constants
     return constants | {"m_p": payload, "l1": truth.arm.l1, "l2": truth.arm.l2}

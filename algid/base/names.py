@@ -74,6 +74,11 @@ def vector(
     return np.array([value_of[name] for name in names], dtype=np.float64)
 
 
+def named_values(names: Iterable[str], values: FloatArray) -> dict[str, float]:
+    """Values (n,) by name: the inverse of `vector`."""
+    return dict(zip(names, values.tolist(), strict=True))
+
+
 def rows_of(
     block: Mapping[str, NDArray[Any]], rows: slice | NDArray[Any]
 ) -> dict[str, NDArray[Any]]:

@@ -17,6 +17,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.base.criteria import UNDETERMINED
 from algid.base.errors import SettingError
+from algid.base.names import named_values
 from algid.base.progress import Progress
 from algid.designs.belief import Belief, Load, Objective, objective_of
 from algid.designs.information import Experiment, Information, Sensitivities
@@ -196,7 +197,7 @@ class Planned:
     @property
     def bounds(self) -> dict[str, float]:
         """By parameter the standard deviation that is to be expected."""
-        return dict(zip(self.names, self.std.tolist(), strict=True))
+        return named_values(self.names, self.std)
 
     @property
     def relative(self) -> FloatArray:

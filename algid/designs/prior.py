@@ -9,7 +9,7 @@ import numpy as np
 
 from algid.arm import CONSTANT_NAMES, Arm, FloatArray
 from algid.base.errors import ResultError, SettingError
-from algid.base.names import outside, vector
+from algid.base.names import named_values, outside, vector
 from algid.base.significance import SURE
 from algid.designs.belief import Belief
 from algid.estimators.noise import first_guess
@@ -102,7 +102,7 @@ def prior_of(given: Result | str, loaded: bool | None, knowns: PriorKnowledge) -
         prior = _of_result(given, source, loaded, knowns)
     else:
         prior = of_case(load_case(given), source, loaded, knowns)
-    value = dict(zip(prior.belief.shared.names, prior.belief.mean.tolist(), strict=True))
+    value = named_values(prior.belief.shared.names, prior.belief.mean)
     wrong = wrong_inertia(value)
     if wrong is not None:
         raise SettingError(
@@ -130,7 +130,7 @@ def of_case(case: Case, source: str, loaded: bool | None, knowns: PriorKnowledge
     def parameters(arm: Arm, mass: float) -> FloatArray:
         """Of the arm and a payload that is shaped like the case's."""
         inertia = case.inertia * (mass / case.payload if case.payload else 1.0)
-        value = dict(zip((*CONSTANT_NAMES, *SINES), arm.phasors().tolist(), strict=True))
+        value = named_values((*CONSTANT_NAMES, *SINES), arm.phasors())
         l2 = arm.l2 if x is None else x
         value |= {"m_p": mass, "l1": arm.l1, "l2": l2, "y_p": y, "J_p": inertia}
         return vector(shared.names, value)

@@ -20,7 +20,7 @@ from operator import itemgetter
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.base.names import evenly_spread, outside, vector
+from algid.base.names import evenly_spread, named_values, outside, vector
 from algid.base.significance import SURE
 from algid.estimators.conventions import (
     AS_READ,
@@ -160,7 +160,7 @@ class Candidate:
     @property
     def convincing(self) -> bool:
         """Whether this is a real arm: inertias determined, no bound broken, torque explained."""
-        if self.broken or float(self.left.max()) >= EXPLAINED:
+        if self.broken or self.left.max() >= EXPLAINED:
             return False
         return all(self.demands.get(name, np.inf) > MET for name in _INERTIAL)
 
@@ -280,7 +280,7 @@ def _least(scores: Callable[[FloatArray], FloatArray], start: FloatArray) -> Flo
     grid = np.array(list(product(_GRID, repeat=start.size)))
     for _ in range(_MOST_GRIDS):
         points = best + reach * grid
-        least = points[int(np.argmin(scores(points)))]
+        least = points[np.argmin(scores(points))]
         if np.all(np.abs(least - best) < 0.75 * reach):
             reach *= 0.5
         best = least
@@ -367,7 +367,7 @@ class Trials:
             return float(_score(left)[0])
 
         def scores(points: FloatArray) -> FloatArray:
-            return np.array(list(map(score, np.exp(points[:, 0]).tolist())))
+            return np.array([score(scale) for scale in np.exp(points[:, 0]).tolist()])
 
         travel = np.max([np.ptp(log.theta, axis=1) for log in self._coarse], axis=0)
         scale = min(_grid(float((travel * joints).max())), key=partial(score, coarse=True))
@@ -407,7 +407,7 @@ class Trials:
 
     def _phases(self, c: FloatArray) -> FloatArray:
         """The phases in rad of the moments among coefficients (q,), 0 of one without a column."""
-        k = dict(zip(self._model.names, c.tolist(), strict=True))
+        k = named_values(self._model.names, c)
         return np.angle([phasor_of(k, moment) for moment in MOMENTS])
 
     def bent(self) -> float | None:

@@ -156,7 +156,7 @@ def summed(angles: Convention, logs: Sequence[Segment], model: Model) -> Convent
         raise TooShortError(f"no {OF_A_WINDOW}")
     gram = np.sum([normal.gram.sum(axis=0) for normal in normals], axis=0)
     rows = np.stack([normal.rows for normal in normals])
-    seconds = WINDOW / OVERLAP * float(np.sum(rows.max(axis=1) + OVERLAP))
+    seconds = WINDOW / OVERLAP * np.sum(rows.max(axis=1) + OVERLAP)
     return ConventionSums(gram[:, :-1, :-1], rows.sum(axis=0) / OVERLAP, speed, seconds)
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.base.compiled import chi2_exceeded, chi2_tail, normal_exceeded
-from algid.base.names import outside, within
+from algid.base.names import named_values, outside, within
 from algid.base.significance import sigmas
 from algid.estimators.combine import (
     RANK_TOLERANCE,
@@ -78,7 +78,7 @@ def bounds(shared: Shared, beta: FloatArray) -> dict[str, float]:
     """
     model = shared.model
     k1 = phasor(model, beta, K1)
-    bent = -float(np.angle(k1))
+    bent = -np.angle(k1)
     if abs(bent) > np.pi / 2:
         bent += np.pi  # k1 itself may be negative: a convention of θ2
     poses = np.array([[0.0, 0.0], [bent, bent + np.pi]])
@@ -135,7 +135,7 @@ def length_by_constants(fit: Fit) -> tuple[float, float] | None:
         return None
 
     def length(beta: FloatArray) -> float:
-        values = dict(zip(fit.names, beta.tolist(), strict=True))
+        values = named_values(fit.names, beta)
         return length_by_coupling(values, fit.shared.model.gravity) or 0.0
 
     return measured(fit, length) if length(fit.values) else None
@@ -284,7 +284,7 @@ def ratio_of_joints(normals: Sequence[Normal], model: Model, unlike: float) -> f
     apart = (s - ratios[:, None] * f) / size
     V = (S + ratios[:, None, None] ** 2 * F) / np.outer(size, size)
     chi2 = np.einsum("ri,rij,rj->r", apart, np.linalg.pinv(V, RANK_TOLERANCE, True), apart)
-    best = int(np.argmin(chi2))
+    best = np.argmin(chi2)
     ratio = ratios[best]
     differs = min(ratio, 1 / ratio) < 1 - unlike
     if not differs or chi2[0] - chi2[best] < FAR_BEYOND**2:
@@ -365,10 +365,10 @@ def repeatability(fit: Fit) -> tuple[FloatArray, float, tuple[float, float]] | N
     for log in loaded:
         T, scores = scores_of(fit.shared, log, fit.values)
         slope = T[:, place]
-        information = float(slope @ log.total[0] @ slope)
+        information = slope @ log.total[0] @ slope
         if information <= 0:
             return None
-        masses.append(fit.values[place] + float(np.sum(scores @ slope)) / information)
+        masses.append(fit.values[place] + np.sum(scores @ slope) / information)
     freedom = len(masses) - 1
     std = float(np.std(masses, ddof=1))
     low, high = (

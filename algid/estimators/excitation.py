@@ -41,8 +41,8 @@ def undriven(fit: Fit, problem: Problem) -> Notice | None:
     for _, c, gram in _at_fit(fit, problem):
         power = gram[:, -1, -1]
         for joint in range(2):
-            acting = float(np.diag(gram[joint])[:-1] @ c**2)
-            if power[joint] == 0 and acting < LEAST_ACTING**2 * float(power[1 - joint]):
+            acting = np.diag(gram[joint])[:-1] @ c**2
+            if power[joint] == 0 and acting < LEAST_ACTING**2 * power[1 - joint]:
                 return Notice("HARDLY_DRIVEN", numbers={"case": "passive", "joint": joint + 1})
     return None
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from algid.arm import FloatArray, keep_arrays, read_only
 from algid.base.compiled import student_quantile
-from algid.base.names import vector
+from algid.base.names import named_values, vector
 from algid.base.significance import NORMAL
 from algid.estimators.combine import (
     FEWEST_LOGS,
@@ -317,7 +317,7 @@ def solved_anew(fit: Fit, shared: Shared, prior: Prior | None, shrinkage: Prior 
     It starts from what the fit knows, given lengths included; what is new is zero. The arm's own
     parameters are no surer than they were.
     """
-    known = dict(zip(fit.names, fit.values.tolist(), strict=True)) | fit.shared.lengths
+    known = named_values(fit.names, fit.values) | fit.shared.lengths
     anew = finish(
         fit.estimator,
         shared,

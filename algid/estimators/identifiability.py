@@ -110,7 +110,7 @@ def _spectrum(S: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray, 
     """Eigenvalues and vectors of the information scaled by the sizes, and which count as zero."""
     scaled = S * np.outer(size, size)
     eigenvalues, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
-    least = max(1 / UNDETERMINED**2, _NOTHING * float(eigenvalues[-1]))
+    least = max(1 / UNDETERMINED**2, _NOTHING * eigenvalues[-1])
     return eigenvalues, vectors, eigenvalues < least
 
 
@@ -144,7 +144,7 @@ def _left_open(
     if still.all():
         why = ": neither joint moved"
     elif still.any():
-        why = f": joint {int(np.argmax(still)) + 1} never moved"
+        why = f": joint {np.argmax(still) + 1} never moved"
     for group in _groups(null):
         part = null[group]
         together = [names[row] for row in group]
@@ -153,7 +153,7 @@ def _left_open(
         if free >= len(group):
             said = [{"case": "alone", "names": [name]} for name in together]
         elif len(group) == 2:
-            widest = int(np.argmax(np.linalg.norm(part, axis=0)))
+            widest = np.argmax(np.linalg.norm(part, axis=0))
             first, second = part[:, widest] * size[group]
             ratio = float(-second / first)
             case = "ratio"  # so many times the first plus the second are determined

@@ -28,7 +28,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.base.criteria import SETTLED
-from algid.base.names import evenly_spread
+from algid.base.names import evenly_spread, named_values
 from algid.base.progress import Progress
 from algid.base.quantiles import quantile
 from algid.base.significance import level
@@ -134,7 +134,7 @@ def fit(problem: Problem) -> Fit:
     for log in tested:
         log.smooth, log.by_motion = True, not acting(shared.model, "elastic")
         c = shared.coefficients(fitted.values, log.loaded)
-        at[log.loaded] = dict(zip(shared.log_names, c.tolist(), strict=True))
+        at[log.loaded] = named_values(shared.log_names, c)
     try:
         products = Products(tested, shared.model, at, problem.settings.shift.delay, shapes)
         p_value = misfit(tested, (log.noise.tau for log in tested), fitted, products)

@@ -65,7 +65,7 @@ from numpy.typing import NDArray
 from algid.arm import FloatArray, keep_arrays
 from algid.base.compiled import chi2_tail
 from algid.base.criteria import AT_REST
-from algid.base.names import outside, within
+from algid.base.names import named_values, outside, within
 from algid.base.significance import chance, level
 from algid.estimators import instruments, weak
 from algid.estimators.combine import (
@@ -414,7 +414,7 @@ def expectation(
     torque = np.sqrt(np.sum([normal.power for normal in normals], axis=0) / np.maximum(rows, 1.0))
     # a joint without a motor carries a load like the other's
     torque = np.where(torque > 0, torque, torque.max())
-    value = dict(zip(shared.names, np.abs(beta).tolist(), strict=True))
+    value = named_values(shared.names, np.abs(beta))
     found = []
     for term in shared.model.terms + (DELAYS if shared.delay else ()):
         spread, mean = EVERY_TERM[term].spread, 0.0

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.base.names import vector
+from algid.base.names import named_values, vector
 from algid.estimators.body import with_body
 from algid.estimators.combine import (
     BlockSums,
@@ -164,7 +164,7 @@ def first_estimate(
     (whole,) = by_kind(under_load)
     # A prior far tighter than the loaded logs holds the arm.
     hold = Prior(shared.log_names, arm, 1e4 * whole.total[0])
-    change = dict(zip(shared.log_names, (whole.c0 - arm).tolist(), strict=True))
+    change = named_values(shared.log_names, whole.c0 - arm)
     tried = []
     for mass in _FIRST_MASSES:
         guess = {"m_p": mass}

@@ -21,7 +21,7 @@ from scipy.special import stdtridf
 
 from algid import __version__
 from algid.base.errors import ResultError, SettingError
-from algid.base.names import vector, within
+from algid.base.names import named_values, vector, within
 from algid.estimators.diagnostics import bounds
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.exports.description import describe
@@ -84,7 +84,7 @@ def drawn_files(
         one_each = random.multivariate_normal(
             still, correlation, method="eigh", check_valid="ignore"
         )
-        numbers = dict(zip(names, (mean + size * one_each * wide).tolist(), strict=True))
+        numbers = named_values(names, mean + size * one_each * wide)
         beta = vector(shared.names, numbers, 0.0)
         broken = [name for name, value in bounds(shared, beta).items() if value < 0]
         moved = {}

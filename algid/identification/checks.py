@@ -289,16 +289,16 @@ def _of_odd_logs(found: Fitted) -> Iterator[Notice]:
         np.fill_diagonal(far, np.inf)
         middle = np.argsort(far, axis=1)[:, (len(own) - 2) // 2]  # of the others
         typical = far[np.arange(len(own)), middle]
-        odd, one = np.flatnonzero(typical > FAR), int(np.argmax(typical))
+        odd, one = np.flatnonzero(typical > FAR), np.argmax(typical)
         if odd.size:
-            place = int(np.argmax(distance[one, middle[one]]))
+            place, apart = np.argmax(distance[one, middle[one]]), float(typical[one])
             numbers = {
                 "case": "odd" if 2 * odd.size < len(own) else "unlike",
                 "names": [PurePath(logs[number].name).name for number in odd],
                 "name": own[one].names[rigid[place]],
                 "values": values[[one, middle[one]], place].tolist(),
-                "distance": float(typical[one]),
-                "p_value": chance(float(typical[one])),
+                "distance": apart,
+                "p_value": chance(apart),
             }
             yield Notice("LOGS_APART", numbers=numbers)
 
@@ -393,7 +393,7 @@ def _angle(fit: Fit, *names: str) -> tuple[float, float]:
 
     found = product(fit.values)
     # beside its own value no angle is cut at half a turn
-    _, std = measured(fit, lambda beta: float(np.angle(product(beta) * found.conjugate())))
+    _, std = measured(fit, lambda beta: np.angle(product(beta) * found.conjugate()))
     return float(np.angle(found)), fit.quantile * std
 
 
@@ -460,7 +460,7 @@ def _without_friction(fit: Fit) -> bool:
         return False
     known = _of_fit(fit)
     k3, k4, k5 = (_size(known, name)[0] for name in (K3, K4, K5))
-    most = NO_DAMPING * float(np.sqrt((k3 + k5) * k4))
+    most = NO_DAMPING * np.sqrt((k3 + k5) * k4)
     sizes = [_size(known, name) for name in (K6, K7)]
     return all(value < off and value + off < most for value, off in sizes)
 
