@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from algid.base.names import outside, within
+from algid.base.names import names_in, outside, within
 from algid.base.significance import sigmas
 from algid.estimators.combine import likelihood
 from algid.estimators.fit import Fit, solved_anew
@@ -79,12 +79,11 @@ def averaged_over_bodies(fit: Fit) -> Fit:
     for more in _bodies(outside(names, fit.shared.body)):
         body = within(BODY_PARAMETERS, fit.shared.body + more)
         other = with_body_of(fit, body)
-        weight = _weight(other, more)
-        if weight > 0:
+        if all(_worths(other)):  # else no object has it, or the logs leave it open
             places = list(map(other.names.index, fit.names))
             values.append(other.values[places])
             covariances.append(other.covariance[np.ix_(places, places)])
-            weights.append(weight)
+            weights.append(float(np.exp(min(0.5 * other.wald(more), _MOST) - len(more))))
     w = np.array(weights) / sum(weights)
     beta = w @ np.array(values)
     apart = np.array(values) - beta
@@ -96,29 +95,16 @@ def averaged_over_bodies(fit: Fit) -> Fit:
 _MOST = 100.0  # W / 2, beyond which a weight is all there is
 
 
-def _weight(fit: Fit, more: Sequence[str]) -> float:
-    """exp(W / 2 - n) of the parameters `more`; 0 of what no object has, or the logs leave open."""
-    if not fit.converged or not all(_worths(fit)):
-        return 0.0
-    return float(np.exp(min(0.5 * fit.wald(more), _MOST) - len(more)))
-
-
-def _candidates(fit: Fit) -> tuple[list[str], float]:
+def _candidates(fit: Fit) -> tuple[tuple[str, ...], float]:
     """The parameters of the body that a fit may have, and the Wald statistic that each has to pass.
 
     An offset shows in the sine parts alone. `FALSE` is shared evenly by the tails: an offset has
     two, an inertia, which is positive, has one.
     """
     across = not set(SINES).isdisjoint(fit.shared.log_names)
-    names, tails = [], 0
-    for one in BODY:
-        if one.sign == "+":
-            names.append(one.name)
-            tails += 1
-        elif across:
-            names.append(one.name)
-            tails += 2
-    return names, sigmas(FALSE, tails, sides=1) ** 2
+    own = [one for one in BODY if across or one.sign == "+"]
+    tails = sum(1 if one.sign == "+" else 2 for one in own)
+    return names_in(own), sigmas(FALSE, tails, sides=1) ** 2
 
 
 def with_body_of(fit: Fit, body: Sequence[str]) -> Fit:

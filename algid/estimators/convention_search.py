@@ -134,9 +134,30 @@ class Candidate:
     @cached_property
     def demands(self) -> dict[str, float]:
         """What physics demands, and how many standard deviations the log is on the right side."""
-        demands = _demands(self.constants, self.covariance, self.speed)
+        k, demands = self.constants, dict[str, float]()
+        k1, m22, k5 = k[K1], k[K3] + k[J2], k[K5]
+        first, second = self.speed.tolist()
+        slopes = {
+            "M22 > 0": {K3: 1.0, J2: 1.0},
+            "k5 > 0": {K5: 1.0},
+            "det M > 0": {K1: -2 * k1, K3: k5 + k[J2], K5: m22, J2: k5 + k[K3]},
+            "friction of joint 1 > 0": {K6: first, F1: 1.0},
+            "friction of joint 2 > 0": {K7: second, F2: 1.0},
+            "k1 > 0": {K1: 1.0},
+            "k2 > 0": {K2: 1.0},
+            "k4 > 0": {K4: 1.0},
+        }
+        for name, of_demand in slopes.items():
+            if of_demand.keys() <= k.keys():
+                slope = vector(k, of_demand, otherwise=0.0)
+                spread = max(float(slope @ self.covariance @ slope), 1e-300) ** 0.5
+                demands[name] = float(slope @ vector(k, k)) / spread
+        demands["det M > 0"] /= 2  # of second degree, so that its slopes make twice its value
+        if "k2 > 0" in demands:
+            of_k1, of_k2 = demands.pop("k1 > 0"), demands["k2 > 0"]
+            demands["k1 k2 > 0"] = copysign(min(abs(of_k1), abs(of_k2)), of_k1 * of_k2)
         if self.balanced:
-            demands = {name: far for name, far in demands.items() if name not in _OF_SIDE}
+            return {name: demands[name] for name in outside(demands, _OF_SIDE)}
         return demands
 
     @property
@@ -467,30 +488,3 @@ def _grid(travel: float) -> list[float]:
         grid.append(scale)
         scale *= 1 + min(0.15, 0.5 * scale / max(travel, 1e-9))
     return grid
-
-
-def _demands(k: dict[str, float], covariance: FloatArray, speed: FloatArray) -> dict[str, float]:
-    """What physics demands of the coefficients, in standard deviations on its right side."""
-    k1, m22, k5 = k[K1], k[K3] + k[J2], k[K5]
-    first, second = speed.tolist()
-    slopes = {
-        "M22 > 0": {K3: 1.0, J2: 1.0},
-        "k5 > 0": {K5: 1.0},
-        "det M > 0": {K1: -2 * k1, K3: k5 + k[J2], K5: m22, J2: k5 + k[K3]},
-        "friction of joint 1 > 0": {K6: first, F1: 1.0},
-        "friction of joint 2 > 0": {K7: second, F2: 1.0},
-        "k1 > 0": {K1: 1.0},
-        "k2 > 0": {K2: 1.0},
-        "k4 > 0": {K4: 1.0},
-    }
-    demands = {}
-    for name, of_demand in slopes.items():
-        if of_demand.keys() <= k.keys():
-            slope = vector(k, of_demand, otherwise=0.0)
-            spread = max(float(slope @ covariance @ slope), 1e-300) ** 0.5
-            demands[name] = float(slope @ vector(k, k)) / spread
-    demands["det M > 0"] /= 2  # of second degree, so that its slopes make twice its value
-    if "k2 > 0" in demands:
-        of_k1, of_k2 = demands.pop("k1 > 0"), demands["k2 > 0"]
-        demands["k1 k2 > 0"] = copysign(min(abs(of_k1), abs(of_k2)), of_k1 * of_k2)
-    return demands

@@ -162,10 +162,9 @@ def _estimate(
 
 def _columns(windows: Sequence[PaperSeries], names: Sequence[str]) -> dict[str, FloatArray]:
     values = np.concatenate([window.values for window in windows], axis=1)
-    columns = {"t": np.concatenate([window.t for window in windows])}
-    columns |= dict(zip(names, values, strict=True))
+    columns = dict(zip(names, values, strict=True))
     columns.pop("k5+k3", None)  # the sum is Table 4's and follows from the others
-    return columns
+    return {"t": np.concatenate([window.t for window in windows])} | columns
 
 
 def _is_no_arm(k: FloatArray, wander: FloatArray) -> bool:

@@ -87,10 +87,9 @@ def outcome_of(found: Fitted) -> Result:
     # a constant that the model has no column for is not identifiable
     estimates = {name: unknown(UNITS[name]) for name in CONSTANT_NAMES}
     estimates |= _estimates(fit)
-    parameters, payload = dict[str, Estimate](), dict[str, Estimate]()
-    for name in outside(estimates, gone):
-        group = payload if name in PAYLOAD_PARAMETERS else parameters
-        group[name] = estimates[name]
+    there = outside(estimates, gone)
+    parameters = {name: estimates[name] for name in outside(there, PAYLOAD_PARAMETERS)}
+    payload = {name: estimates[name] for name in within(there, PAYLOAD_PARAMETERS)}
     rows, summary = table_rows(fit), fit_summary(found)
     loaded = {}
     for name, constants in LOADED_ROWS.items():
