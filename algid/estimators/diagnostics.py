@@ -51,7 +51,6 @@ from algid.model import (
 from algid.notices import Notice
 from algid.physics.terms import OPTIONAL
 
-_NOT_NEGATIVE = tuple(name for name, parameter in PARAMETERS.items() if parameter.sign == "+")
 _NUDGE = 1e-6  # of a parameter's size: step of the differences
 FAR_BEYOND = sigmas(sides=1)
 """Standard deviations past a bound of physics beyond which chance is no explanation; one-sided."""
@@ -92,8 +91,8 @@ def bounds(shared: Shared, beta: FloatArray) -> dict[str, float]:
     if model.gravity > 0:
         # Table 1: k1 k2 = m2² g l1 lc2²; as phasors, θ1's zero lies between them
         values["k1 k2 >= 0"] = (k1 * phasor(model, beta, K2).conjugate()).real
-    for name, value in zip(shared.names, beta.tolist(), strict=True):
-        if name in _NOT_NEGATIVE:
+    for name, value in named_values(shared.names, beta).items():
+        if PARAMETERS[name].sign == "+":
             values[f"{name} >= 0"] = value
     return values
 

@@ -6,7 +6,7 @@ itself. What is alike in every run, a wrong torque constant say, shows in no num
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,8 +17,7 @@ from algid.estimators.combine import FEWEST_LOGS
 from algid.estimators.diagnostics import ratio_of_joints
 from algid.estimators.fit import Fit
 from algid.estimators.modulating_functions import MOTORLESS
-from algid.estimators.problem import Problem
-from algid.estimators.weak import Normal
+from algid.estimators.problem import Problem, Source
 from algid.model import K1, K2, K3
 from algid.notices import Notice
 
@@ -38,7 +37,8 @@ def undriven(fit: Fit, problem: Problem) -> Notice | None:
     torque: constants near nothing solve that equation too, and least squares ends there where
     friction and cables pull as hard as the arm's own load.
     """
-    for _, c, gram in _at_fit(fit, problem):
+    for kind, sources in problem.kinds():
+        c, gram = _at_fit(fit, problem, kind, sources)
         power = gram[:, -1, -1]
         for joint in range(2):
             acting = np.diag(gram[joint])[:-1] @ c**2
@@ -47,15 +47,15 @@ def undriven(fit: Fit, problem: Problem) -> Notice | None:
     return None
 
 
-def _at_fit(fit: Fit, problem: Problem) -> Iterator[tuple[bool, FloatArray, FloatArray]]:
-    """Whether logs are loaded, their coefficients (q,), and sums (2, q + 1, q + 1) of windows."""
-    model = fit.shared.model
-    settings = problem.at(model, fit.delay).settings
-    for kind, sources in problem.kinds():
-        c = fit.shared.coefficients(fit.values, kind)[: len(model.names)]
-        normals = weak.normals_of(sources, settings, c)
-        if normals:
-            yield kind, c, np.sum([normal.gram.sum(axis=0) for normal in normals], axis=0)
+def _at_fit(
+    fit: Fit, problem: Problem, kind: bool, sources: Sequence[Source]
+) -> tuple[FloatArray, FloatArray]:
+    """Coefficients (q,) of logs of one kind, and sums (2, q + 1, q + 1) of their windows there."""
+    settings = problem.at(fit.shared.model, fit.delay).settings
+    c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
+    normals = weak.normals_of(sources, settings, c)
+    nothing = np.zeros((2, c.size + 1, c.size + 1))
+    return c, sum((normal.gram.sum(axis=0) for normal in normals), nothing)
 
 
 def contradicted(fit: Fit, problem: Problem) -> Notice | None:
@@ -81,14 +81,17 @@ def contradicted(fit: Fit, problem: Problem) -> Notice | None:
         ratio = ratio_of_joints(normals, settings.model, UNLIKE if few else UNLIKE_IN_MANY)
         if ratio is not None:
             return Notice("JOINTS_CONTRADICT", numbers={"ratio": ratio})
-        hardly = _hardly_driven(normals)
-        if not few or not hardly:
+        torques = np.max([normal.power / normal.rows for normal in normals], axis=0)
+        # a joint without a torque has no motor: see `undriven`
+        hardly = (torques > 0) & (torques < MOTORLESS**2 * torques[::-1])
+        if not few or not hardly.any():
             continue
-        c, gram = next((c, gram) for own, c, gram in _at_fit(fit, problem) if own == kind)
-        if not _confirmed(fit.shared.model.names, hardly, c, gram):
+        joint = int(np.argmax(hardly)) + 1
+        c, gram = _at_fit(fit, problem, kind, sources)
+        if not _confirmed(fit.shared.model.names, joint, c, gram):
             return Notice(
                 "HARDLY_DRIVEN",
-                numbers={"case": "torque", "joint": hardly, "percent": 100 * MOTORLESS},
+                numbers={"case": "torque", "joint": joint, "percent": 100 * MOTORLESS},
             )
     return None
 
@@ -105,15 +108,3 @@ def _confirmed(names: Sequence[str], joint: int, c: FloatArray, gram: FloatArray
     left, part = (gram @ residual) @ residual, (gram @ of_link) @ of_link
     own, other = joint - 1, 2 - joint
     return bool(left[own] < UNEXPLAINED * gram[own, -1, -1] and left[other] < part[other])
-
-
-def _hardly_driven(normals: Sequence[Normal]) -> int | None:
-    """The joint, 1 or 2, whose torque is nowhere more than bearings and cables make, if any.
-
-    One without a torque has no motor: see `undriven`.
-    """
-    torques = np.max([normal.power / normal.rows for normal in normals], axis=0)
-    for joint in range(2):
-        if 0 < torques[joint] < MOTORLESS**2 * torques[1 - joint]:
-            return joint + 1
-    return None

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import PurePath
-from typing import Any
 
 import numpy as np
 
@@ -262,13 +261,21 @@ def _predicted(found: Fitted) -> tuple[PredictionScore, PredictionScore | None]:
 
 def _torque_hold(chosen: Selection) -> results.TorqueHold:
     """What was asked of the torque's hold, what was used, and what the logs show."""
-    late, shown = chosen.late, dict[str, Any]()
-    if late is not None and chosen.hold_by == "logs":
-        shown = {"told": late.determined, "faster": late.faster, "half": late.half}
-        shown |= {"late": late.late, "late_std": finite(late.std)}
-        shown |= {"odds": finite(late.odds), "share": finite(late.share)}
-    asked = chosen.hold if chosen.hold_by == "settings" else "auto"
-    return results.TorqueHold(asked=asked, used=chosen.hold, **shown)
+    late = chosen.late
+    if late is None or chosen.hold_by != "logs":
+        asked = chosen.hold if chosen.hold_by == "settings" else "auto"
+        return results.TorqueHold(asked=asked, used=chosen.hold)
+    return results.TorqueHold(
+        asked="auto",
+        used=chosen.hold,
+        told=late.determined,
+        faster=late.faster,
+        half=late.half,
+        late=late.late,
+        late_std=finite(late.std),
+        odds=finite(late.odds),
+        share=finite(late.share),
+    )
 
 
 def _terms(fit: Fit, chosen: Selection) -> Iterator[results.TermCriterion]:
@@ -334,19 +341,17 @@ def judged(result: Result, survey: Recordings) -> Result:
     # no likelihood stands within the bounds of physics and upright
     doubtful = fit is None or result.estimator != "refined" or bool(fit.broken_bounds) or turned
     # checks, as code and case, of single logs that the fit of all of them makes more precisely
-    replaced = []
-    if turned:
-        replaced.append("WRONG_ZERO:")
-    if result.settings.get("effort") is not None:
-        replaced.append("GRAVITY_COMPENSATED:arm")
-    if not doubtful:  # in another unit no angle's sine would fit
-        replaced.append("DEGREES:reach")
+    replaced = {
+        "WRONG_ZERO:": turned,
+        "GRAVITY_COMPENSATED:arm": result.settings.get("effort") is not None,
+        "DEGREES:reach": not doubtful,  # in another unit no angle's sine would fit
+    }
     down = _pulled_down(fit, len(survey.logs))
     of_logs, other_arms, of_fit = list[Notice](), list[Notice](), result.notices
     truth = survey.logs[0].origin.truth
     for log, is_down in zip(survey.logs, down, strict=True):
         for notice in survey.notices(log, doubtful=doubtful):
-            if notice.key not in replaced and not (is_down and notice.code in _OF_GRAVITY):
+            if not replaced.get(notice.key) and not (is_down and notice.code in _OF_GRAVITY):
                 of_logs.append(notice.of(PurePath(log.name).name))  # the paths stand among the logs
         own = log.origin.truth
         if truth and own and own.arm != truth.arm:  # another synthetic arm
