@@ -80,8 +80,7 @@ from algid.estimators.combine import (
     scatters,
     scores_of,
 )
-from algid.estimators.diagnostics import broken_bounds
-from algid.estimators.excitation import undriven
+from algid.estimators.diagnostics import broken_bounds, undriven
 from algid.estimators.fit import Fit, finish, solved_anew, widened
 from algid.estimators.instruments import Explained, followed
 from algid.estimators.misfit import of_no_term

@@ -13,8 +13,7 @@ from algid.base.names import outside, within
 from algid.base.significance import SURE
 from algid.estimators import robust
 from algid.estimators.body import averaged_over_bodies, with_body
-from algid.estimators.diagnostics import constrained
-from algid.estimators.excitation import undriven
+from algid.estimators.diagnostics import constrained, undriven
 from algid.estimators.fit import Fit, solved_anew
 from algid.estimators.hold import Hold
 from algid.estimators.misfit import TERM_OF

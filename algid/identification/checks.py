@@ -41,11 +41,12 @@ from algid.estimators.diagnostics import (
     bent,
     broken_bounds,
     constrained,
+    contradicted,
     length_by_constants,
     measured,
     payload_distance,
+    undriven,
 )
-from algid.estimators.excitation import contradicted, undriven
 from algid.estimators.fit import Fit, alone
 from algid.estimators.prediction import PredictionScore
 from algid.estimators.robust import unshrunk

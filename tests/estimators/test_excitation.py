@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from algid.estimators import weak
-from algid.estimators.excitation import contradicted
+from algid.estimators.diagnostics import contradicted
 from algid.notices import Notice
 from algid.signals.segments import Segment
 from algid.synth.excitation import wide_multi_sine
