@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.base.errors import LogError, SettingError
-from algid.base.names import within
 from algid.estimators.diagnostics import FAR_BEYOND
 from algid.estimators.paper import (
     SHORTEST,
@@ -38,6 +37,7 @@ from algid.table4 import UNITS, UNLOADED_ROWS, finite, sums
 
 STAGE1_WINDOW = 2.0  # s
 _UNITS = PARAMETER_UNITS | UNITS
+PAYLOAD = ("m_p", "l1")
 STAGE1_FILE = "estimates.parquet"
 STAGE2_FILE = "loaded.parquet"
 ROWS = 1 << 17  # of a block of the series
@@ -73,10 +73,8 @@ def run_paper(
                 f"{logs[1].name}: the paper's method takes one log of each kind; give one, or use "
                 f"{flag('estimator')} refined or weak"
             )
-    parameters, of_loaded = dict[str, Estimate](), dict[str, Estimate]()
-    rows, wrong = dict[str, Estimate](), list[str]()
-    payload = ("m_p", "l1")
-    k = known
+    parameters, loaded, payload, rows = (dict[str, Estimate]() for _ in range(4))
+    k, wrong = known, list[str]()
     if survey.unloaded:
         values, wander, usable = _estimate(survey, survey.unloaded[0], settings, None, folder)
         k = values[: len(CONSTANT_NAMES)]
@@ -86,20 +84,17 @@ def run_paper(
         if usable.all():
             rows = _named(UNLOADED_ROWS, np.array([*sums(UNLOADED_ROWS, k).values()]), usable)
     if survey.loaded:
-        names = STAGE2_NAMES + ("l1", "m_p")
-        values = wander = np.zeros(len(names))
+        values = wander = np.zeros(len(STAGE2_SERIES))
         usable = values > 0  # none where stage 1 failed
         if k is not None and np.isfinite(k).all():
             values, wander, usable = _estimate(survey, survey.loaded[0], settings, k, folder)
-        of_loaded = _named(names, values, usable)
-        if np.any((values + FAR_BEYOND * wander)[len(STAGE2_NAMES) : len(names)] < 0):
+        loaded = _named(STAGE2_NAMES, values, usable)
+        own = [STAGE2_SERIES.index(name) for name in PAYLOAD]
+        payload = _named(PAYLOAD, values[own], usable[own])
+        if np.any((values + FAR_BEYOND * wander)[own] < 0):
             wrong += ["loaded", "payload"]
-    changes = {
-        "parameters": parameters,
-        "loaded": {name: of_loaded[name] for name in within(STAGE2_NAMES, of_loaded)},
-        "payload": {name: of_loaded[name] for name in within(payload, of_loaded)},
-    }
-    result = started(survey, settings, rows | of_loaded)
+    result = started(survey, settings, rows | loaded | payload)
+    changes = {"parameters": parameters, "loaded": loaded, "payload": payload}
     return distrusted(result.model_copy(update=changes), wrong)
 
 

@@ -325,8 +325,18 @@ REMARKS: tuple[Check, ...] = (
 
 def fit_notes(fit: results.FitSummary) -> Iterator[Notice]:
     """Notes on the torque's hold, intervals from blocks, the payload's repeatability, and gains."""
-    if fit.torque_hold is not None:
-        yield from _of_hold(fit.torque_hold)
+    hold = fit.torque_hold
+    if hold is not None and hold.half is not None:  # the logs were asked
+        if hold.faster:
+            known = Remedy({"delay": None}, "half of the controller's period, in s")
+            even = Remedy({"torque_hold": "foh"}, "for a torque that is not held")
+            yield Notice("TORQUE_HOLD", numbers={"case": "fast controller"}, remedies=(known, even))
+        elif not hold.told:
+            held = Remedy({"torque_hold": "zoh"}, "for a digital controller that logs what it sets")
+            numbers = {"case": "unknown", "half": 1e3 * hold.half}
+            yield Notice("TORQUE_HOLD", numbers=numbers, remedies=(held,))
+        elif hold.used == "zoh":
+            yield Notice("TORQUE_HOLD", numbers={"case": "held", "late": 1e3 * hold.half})
     if fit.intervals == "sandwich":
         yield Notice("REPEATABILITY", numbers={"case": "unknown"})
     if fit.repeatability is not None:
@@ -335,23 +345,6 @@ def fit_notes(fit: results.FitSummary) -> Iterator[Notice]:
         numbers = {"masses": masses, "std": fit.repeatability.std, "low": low, "high": high}
         yield Notice("REPEATABILITY", numbers={"case": "payload"} | numbers)
     yield from gain_notes(fit)
-
-
-def _of_hold(hold: results.TorqueHold) -> Iterator[Notice]:
-    """That logs show a held torque, or leave it open."""
-    if hold.half is None:  # nothing was asked of the logs
-        return
-    if hold.faster:
-        known = Remedy({"delay": None}, "half of the controller's period, in s")
-        even = Remedy({"torque_hold": "foh"}, "for a torque that is not held")
-        yield Notice("TORQUE_HOLD", numbers={"case": "fast controller"}, remedies=(known, even))
-    elif not hold.told:
-        held = Remedy({"torque_hold": "zoh"}, "for a digital controller that logs what it sets")
-        yield Notice(
-            "TORQUE_HOLD", numbers={"case": "unknown", "half": 1e3 * hold.half}, remedies=(held,)
-        )
-    elif hold.used == "zoh":
-        yield Notice("TORQUE_HOLD", numbers={"case": "held", "late": 1e3 * hold.half})
 
 
 LEAST_TURN = np.radians(20.0)

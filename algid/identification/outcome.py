@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import PurePath
@@ -176,8 +176,13 @@ def table_rows(fit: Fit) -> dict[str, Estimate]:
 
 def fit_summary(found: Fitted) -> results.FitSummary:
     """The statistical part of a result."""
-    fit, chosen = found.fit, found.chosen
-    residual, crossed = _predicted(found)
+    fit, survey, settings, chosen = found.fit, found.survey, found.settings, found.chosen
+    residual = sum(scores(predictor_of_fit(found), survey), PredictionScore())
+    crossed = None  # each log predicted from the others, where asked and possible
+    if settings.cross_validate:
+        unloaded = [partial(survey.segments, log) for log in survey.unloaded]
+        loaded = [partial(survey.segments, log) for log in survey.loaded]
+        crossed = cross_validate(fit, unloaded, loaded, settings.torque_shift())
     noise = {}  # root mean squares over the logs
     if fit.noise:
         squares = np.sqrt(np.mean(np.square(fit.noise), axis=0)).ravel().tolist()
@@ -194,7 +199,7 @@ def fit_summary(found: Fitted) -> results.FitSummary:
         expected = fit.shrinkage.names
     elif chosen.undetermined is not None:
         expected = within(DELAYS, fit.names)
-    gain, known = None, found.settings.payload_mass
+    gain, known = None, settings.payload_mass
     if known is not None and "m_p" in fit.names:
         # all that has N m in its unit, m_p too, grows with a common gain of both torques
         gain = _inverse(fit, "m_p", known, "1")
@@ -205,6 +210,18 @@ def fit_summary(found: Fitted) -> results.FitSummary:
             whiteness[name] = results.WhitenessTest(
                 white=white, p_value=finite(p), lag1_correlation=lag1
             )
+    # worth of each term that the logs chose from, or of those that were given
+    terms = [
+        # a Wald statistic is twice a difference of log-likelihoods
+        results.TermCriterion(
+            term=one.term, kept=one.kept, evidence=finite(0.5 * one.evidence), why=one.reason
+        )
+        for one in chosen.trials
+    ]
+    if not terms:
+        for name, delta_bic in term_worths(fit):
+            worth = results.TermCriterion(term=name, delta_bic=delta_bic, kept=delta_bic < 0)
+            terms.append(worth)
     bounds = []  # of physics that the estimates break beyond their 95 % intervals
     for one in broken_bounds(fit):
         if one.distance is None or one.distance > fit.quantile:
@@ -232,7 +249,7 @@ def fit_summary(found: Fitted) -> results.FitSummary:
             chosen_by=chosen.chosen_by,
             shrunk=list(expected),
         ),
-        terms=list(_terms(fit, chosen)),
+        terms=terms,
         torque_hold=_torque_hold(chosen),
         broken_bounds=bounds,
         endogeneity=endogeneity,
@@ -246,17 +263,6 @@ def fit_summary(found: Fitted) -> results.FitSummary:
             for place, joint in acting(fit.shared.model, "elastic")
         },
     )
-
-
-def _predicted(found: Fitted) -> tuple[PredictionScore, PredictionScore | None]:
-    """How well the fit predicts its own logs and, if asked and possible, each from the others."""
-    fit, survey, settings = found.fit, found.survey, found.settings
-    own = sum(scores(predictor_of_fit(found), survey), PredictionScore())
-    if not settings.cross_validate:
-        return own, None
-    unloaded = [partial(survey.segments, log) for log in survey.unloaded]
-    loaded = [partial(survey.segments, log) for log in survey.loaded]
-    return own, cross_validate(fit, unloaded, loaded, settings.torque_shift())
 
 
 def _torque_hold(chosen: Selection) -> results.TorqueHold:
@@ -276,21 +282,6 @@ def _torque_hold(chosen: Selection) -> results.TorqueHold:
         odds=finite(late.odds),
         share=finite(late.share),
     )
-
-
-def _terms(fit: Fit, chosen: Selection) -> Iterator[results.TermCriterion]:
-    """Worth of each term that the logs chose from, or of those that were given."""
-    if not chosen.trials:
-        for term, delta_bic in term_worths(fit):
-            yield results.TermCriterion(term=term, delta_bic=delta_bic, kept=delta_bic < 0)
-    for trial in chosen.trials:
-        yield results.TermCriterion(
-            term=trial.term,
-            kept=trial.kept,
-            # a Wald statistic is twice a difference of log-likelihoods
-            evidence=finite(0.5 * trial.evidence),
-            why=trial.reason,
-        )
 
 
 def _inverse(fit: Fit, name: str, over: float, unit: str) -> Estimate:
