@@ -170,16 +170,16 @@ def identify(
 
 def _with_meaning(settings: Settings, meaning: Profile, earlier: Earlier | None) -> Settings:
     """The settings, completed from the profile or an earlier result where they are not set."""
-    names: tuple[str, ...] = (*OF_BOTH, *OF_PRIOR)
-    if earlier is not None:
-        if settings.prior is not None:
-            raise SettingError(
-                f"{flag('prior')}: the arm is known by {flag('parameters')}; leave one of them out"
-            )
-        names = OF_BOTH
-    unset = {name for name in names if getattr(settings, name) == DEFAULTS[name]}
-    stated = meaning.model_fields_set & unset
-    settings = settings.but(**{name: getattr(meaning, name) for name in stated})
+    names = set(OF_BOTH) if earlier is not None else {*OF_BOTH, *OF_PRIOR}
+    if earlier is not None and settings.prior is not None:
+        raise SettingError(
+            f"{flag('prior')}: the arm is known by {flag('parameters')}; leave one of them out"
+        )
+    changes = {}
+    for name in names & meaning.model_fields_set:
+        if getattr(settings, name) == DEFAULTS[name]:
+            changes[name] = getattr(meaning, name)
+    settings = settings.but(**changes)
     if settings.prior_error is not None and settings.prior is None:
         raise SettingError(
             f"{flag('prior_error')}: expected a prior that errs by as much, found none; give "
