@@ -106,6 +106,8 @@ def choose_model(
     return replace(chosen, hold=hold, hold_by=hold_by)
 
 
+Given = Callable[[Selection], Problem]
+"""What an estimator is given to fit a model."""
 _OF_HOLD = "kept: the logs leave open whether the torque is held, half a sample late"
 _OF_CONTROLLER = "kept: the logs leave open how late a controller that is faster than they are acts"
 
@@ -160,9 +162,7 @@ def run_fit(
     problem = partial(problem_of, survey, settings, prior=prior)
     estimate = estimator_of(settings.estimator).fit
 
-    def most_likely(
-        chosen: Selection, given: Callable[[Selection], Problem]
-    ) -> tuple[Fit, Selection]:
+    def most_likely(chosen: Selection, given: Given) -> tuple[Fit, Selection]:
         """The fit of the chosen terms, or of those that its own likelihood chooses."""
         fit = estimate(given(chosen))
         better, other = fit, chosen
@@ -243,7 +243,7 @@ def _of_motorless(
     chosen: Selection,
     picked: Selection,
     asked: Sequence[str],
-    problem: Callable[[Selection], Problem],
+    problem: Given,
 ) -> tuple[Fit, Selection]:
     """The fit by instruments, where least squares leaves open what a joint without a motor does.
 
@@ -281,9 +281,7 @@ def _of_motorless(
 _SHRUNK = "kept and shrunk: where the likelihood is refuted no term is chosen"
 
 
-def _shrunk(
-    notes: tuple[Notice, ...], chosen: Selection, problem: Callable[[Selection], Problem]
-) -> tuple[Fit, Selection]:
+def _shrunk(notes: tuple[Notice, ...], chosen: Selection, problem: Given) -> tuple[Fit, Selection]:
     """The fit with every term shrunk, and its model; `notes` say why no other stands."""
     # where the first pass is refuted more than elastic joints is amiss, which they would take up
     firm = chosen.refuted or set(ELASTIC).isdisjoint(chosen.model.terms)

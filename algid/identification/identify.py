@@ -249,14 +249,12 @@ def _by_likelihood(
     survey.begin("prediction")
     result = outcome_of(found)
     # gravity that is turned against θ1, unless the caller, or the log itself, says its zero
-    turned: Iterable[Notice] = ()
-    log = survey.logs[0]
+    log, notices = survey.logs[0], result.notices + of_driver
     reading = log.origin.reading
     said_of_zero = {"zero", "offsets", "theta1.offset"}.intersection(flat(stated))
     plain = reading.zero == "horizontal" and reading.offsets[0] == 0
     if earlier is None and plain and not said_of_zero:
-        turned = turn_note(found.fit, log)
-    notices = [*turned, *result.notices, *of_driver]
+        notices = [*turn_note(found.fit, log), *notices]
     result = result.model_copy(update={"notices": notices})
     if folder is None:
         return result

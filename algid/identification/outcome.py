@@ -314,9 +314,15 @@ def _pulled_down(fit: results.FitSummary | None, count: int) -> list[bool]:
     The fit has to explain the torques and to break no bound. A zero that is off turns k4 into its
     sine part k4s: the model must have had that to choose from.
     """
-    if fit is None or fit.model is None or fit.residual is None or len(fit.by_log) != count:
-        return [False] * count
-    if fit.model.chosen_by != "logs" or fit.broken_bounds or fit.residual.unexplained(LEAST_R2):
+    if (
+        fit is None
+        or fit.model is None
+        or fit.residual is None
+        or len(fit.by_log) != count
+        or fit.model.chosen_by != "logs"
+        or fit.broken_bounds
+        or fit.residual.unexplained(LEAST_R2)
+    ):
         return [False] * count
     down, nothing = [], unknown(UNITS[K4])
     for own in fit.by_log:
