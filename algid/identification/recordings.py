@@ -5,8 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from itertools import chain, islice
 from pathlib import Path
@@ -21,9 +20,9 @@ from algid.base.names import evenly_spread
 from algid.base.progress import Progress
 from algid.base.runtime import ahead, beside
 from algid.log import Log, Origin
-from algid.notices import Notice
+from algid.notices import Notice, has_code
 from algid.readers.clock import check_step
-from algid.readers.memory import FrameOrArrays, is_columns, refuse_others
+from algid.readers.memory import FrameOrArrays, is_columns
 from algid.results import LogSummary
 from algid.signals.segments import Segment, segments
 
@@ -58,6 +57,12 @@ class Recording:
     digest : callable or None
         Gives the SHA-256 of the log; None where only parts of it are here.
     notices : of opening it, then of the first pass too
+    rows : samples; None before a pass has come to the end
+    first_ns, last_ns : its first and its last stamp
+    limits : of its torques; None before its first samples are examined
+    recorded : what its conventions are judged by, where those of several logs are together
+    begin : all of a log that was looked at before its first pass
+    kept : its segments, of a log that stays in memory
     """
 
     name: str
@@ -67,15 +72,13 @@ class Recording:
     promised: int
     digest: Callable[[], str] | None
     notices: tuple[Notice, ...] = ()
-    rows: int | None = field(default=None, init=False)
-    """Samples; None before a pass has come to the end."""
-    first_ns: int = field(default=0, init=False)
-    last_ns: int = field(default=0, init=False)
-    _begin: Log | None = field(default=None, init=False)
-    """All of a log that was looked at before its first pass."""
-    _findings: tuple[Notice, ...] | None = field(default=None, init=False)
-    _kept: tuple[Segment, ...] | None = field(default=None, init=False)
-    _hash: Future[str] | None = field(default=None, init=False)
+    rows: int | None = None
+    first_ns: int = 0
+    last_ns: int = 0
+    limits: tuple[Limit, ...] | None = None
+    recorded: list[Recorded] | None = None
+    begin: Log | None = None
+    kept: tuple[Segment, ...] | None = None
 
     @property
     def duration(self) -> float:
@@ -92,6 +95,8 @@ class Staged:
 
 
 LogLike = str | Path | Log | Staged | FrameOrArrays
+OneOrMore = LogLike | Iterable[LogLike] | None
+"""What a call takes of a role: a log, several, or none."""
 
 
 def open_source(
@@ -119,24 +124,20 @@ def open_source(
     name = None
     if isinstance(log, Staged):
         name, log = log.url, log.path
-    elif not isinstance(log, Log):
-        refuse_others(log)
-        if is_columns(log):
-            log = open_log(log, profile).whole()
-    if isinstance(log, Log):
-        source = _in_memory(log, role)
-    else:
-        assert isinstance(log, str | Path)
+    if isinstance(log, str | Path):
         path = Path(log)
         reader = open_log(path, profile)
 
         def blocks() -> Iterator[Log]:
-            read = _checked(reader.blocks())
             # of a short log a thread would cost more than it reads ahead
-            return read if 0 < reader.rows <= SHORT else ahead(read)
+            return reader.blocks() if 0 < reader.rows <= SHORT else ahead(reader.blocks())
 
         digest = cache(partial(sha256_of, path))
         source = Recording(name or str(log), role, reader.origin, blocks, reader.rows, digest)
+    else:
+        if not isinstance(log, Log):
+            log = open_log(log, profile).whole()
+        source = _in_memory(log, role)
     truth = source.origin.truth
     if truth is None or changing:
         return source
@@ -161,7 +162,6 @@ def _in_memory(log: Log, role: Role) -> Recording:
     if "theta1" not in reading.channels and "DEGREES" not in reading.accepted:
         accepted = replace(reading, accepted=reading.accepted + ("DEGREES",))
         log = replace(log, origin=replace(log.origin, reading=accepted))
-    check_step(log.origin.path, log.stamp_ns)
 
     def digest() -> str:
         every = hashlib.sha256()
@@ -172,18 +172,8 @@ def _in_memory(log: Log, role: Role) -> Recording:
     return Recording(log.origin.path, role, log.origin, lambda: iter([log]), len(log), digest)
 
 
-def _checked(blocks: Iterable[Log]) -> Iterator[Log]:
-    """The blocks, of which the first has to be sampled as an arm is."""
-    for number, block in enumerate(blocks):
-        if number == 0:
-            check_step(block.origin.path, block.stamp_ns)
-        yield block
-
-
 def open_sources(
-    unloaded: LogLike | Iterable[LogLike] | None,
-    loaded: LogLike | Iterable[LogLike] | None,
-    profile: Profile | None = None,
+    unloaded: OneOrMore, loaded: OneOrMore, profile: Profile | None = None
 ) -> list[Recording]:
     """Sources of one log, several, or none of each role, unloaded ones first: see `open_source`.
 
@@ -191,16 +181,12 @@ def open_sources(
     """
     sources: list[Recording] = []
     called = Counter[str]()
-    both: tuple[tuple[Role, LogLike | Iterable[LogLike] | None], ...]
-    both = (("unloaded", unloaded), ("loaded", loaded))
-    for role, logs in both:
+    given: dict[Role, OneOrMore] = {"unloaded": unloaded, "loaded": loaded}
+    for role, logs in given.items():
         if logs is None:
             continue
-        if isinstance(logs, str | Path | Log | Staged) or is_columns(logs):
-            logs = [logs]
-        if not isinstance(logs, Iterable):
-            refuse_others(logs)
-        for log in logs:
+        alone = isinstance(logs, str | Path | Log | Staged) or is_columns(logs)
+        for log in logs if isinstance(logs, Iterable) and not alone else [logs]:
             source = open_source(log, role, profile)
             called[source.name] += 1
             if called[source.name] > 1 and not isinstance(log, str | Path | Staged):
@@ -250,11 +236,9 @@ class Recordings:
         self.progress = progress
         self._gravity, self._effort = gravity, effort
         self._known: dict[Role, Saturation] = {}
-        self._recorded: dict[Recording, list[Recorded]] = {}
-        self._conventions: dict[Recording, Notice] | None = None
+        self._conventions: dict[Recording, Notice | None] | None = None
         self._room = MOST_KEPT
         self._stage, self._over = "fitting", self.logs
-        self._words = ""
         self._done: dict[Recording, int] = {}
 
     @property
@@ -272,10 +256,6 @@ class Recordings:
         """Codes of what the user says is right in some log."""
         return {code for log in self.logs for code in log.origin.reading.accepted}
 
-    def _limits(self, log: Recording) -> tuple[Limit, ...]:
-        """Limits of the torques of logs of its role, once they are judged."""
-        return self._known[log.role].limits if log.role in self._known else ()
-
     def _weight(self, log: Recording) -> float:
         """Gravity in m/s² in a log's torque; no driver compensates for that of a payload."""
         if self._effort in ("gravity-compensated", "external") and log.role == "unloaded":
@@ -284,7 +264,7 @@ class Recordings:
 
     def begin(self, stage: str, logs: Sequence[Recording] | None = None) -> None:
         """The passes from here on are over `logs`, by default all, and of that stage."""
-        self._stage, self._words = stage, ""
+        self._stage = stage
         self._over = self.logs if logs is None else tuple(logs)
 
     def count_once(self) -> None:
@@ -302,6 +282,7 @@ class Recordings:
                 for _ in self.segments(log):
                     pass
         shares = shared_samples([self._samples(log) for log in self.logs])
+        np.fill_diagonal(shares, 0.0)
         kept: list[int] = []
         copies: dict[int, list[str]] = {}
         # the longest first, which hold the others
@@ -309,10 +290,10 @@ class Recordings:
             log = self.logs[own]
             twin = max(kept, key=lambda other: shares[own, other], default=own)
             share, other = shares[own, twin], self.logs[twin]
-            if share > _WHOLE and twin != own and log.role == other.role:
+            if share > _WHOLE and log.role == other.role:
                 copies.setdefault(twin, []).append(log.name)
                 continue
-            if twin != own and share > 0:
+            if share > 0:
                 case = "part" if log.role == other.role else "loaded"
                 numbers = {"name": log.name, "twin": other.name, "share": 100 * share}
                 other.notices += (Notice("SAME_LOG", numbers={"case": case, **numbers}),)
@@ -325,9 +306,7 @@ class Recordings:
     @staticmethod
     def _samples(log: Recording) -> FloatArray:
         """Angles and torques (4, N) of a log, or of its first block."""
-        parts: Sequence[Segment | Log] | None = log._kept
-        if parts is None:
-            parts = [block.part(0, EXAMINED) for block in islice(log.blocks(), 1)]
+        parts = log.kept or [block.part(0, EXAMINED) for block in islice(log.blocks(), 1)]
         return np.concatenate([np.concatenate([one.theta, one.tau]) for one in parts], axis=1)
 
     def segments(self, log: Recording) -> Iterator[Segment]:
@@ -340,9 +319,9 @@ class Recordings:
         from algid.estimators.saturation import sound
 
         rows = 0
-        if log._kept is not None:
+        if log.kept is not None:
             self._report(log, 0)
-            for piece in log._kept:
+            for piece in log.kept:
                 yield piece
                 rows += len(piece)
                 self._report(log, rows)
@@ -350,15 +329,15 @@ class Recordings:
         uniform = segments(self._blocks(log))
         first = list(islice(uniform, 1))  # which the limits are known after
         held: list[Segment] = []
-        for piece in sound(chain(first, uniform), self._limits(log)):
+        for piece in sound(chain(first, uniform), log.limits or ()):
             rows += len(piece)
             if rows <= self._room:
                 held.append(piece)
             else:
                 held.clear()
             yield piece
-        if rows <= self._room and log._kept is None:
-            log._kept = tuple(held)
+        if rows <= self._room and log.kept is None:
+            log.kept = tuple(held)
             self._room -= rows
 
     def whole(self, log: Recording) -> Recording:
@@ -380,15 +359,12 @@ class Recordings:
         if self._conventions is None:
             self._conventions = {}
             for logs in (self.unloaded, self.loaded) if doubtful else ():
-                known = [one for one in logs if one in self._recorded]
+                known = {
+                    one: (one.origin, one.recorded) for one in logs if one.recorded is not None
+                }
                 if known:
-                    parts = [(one.origin, self._recorded.pop(one)) for one in known]
-                    mended = mends(parts, gravity=self._weight(known[0]) > 0)
-                    self._conventions |= {
-                        one: notice
-                        for one, notice in zip(known, mended, strict=True)
-                        if notice is not None
-                    }
+                    found = mends(list(known.values()), gravity=self._weight(logs[0]) > 0)
+                    self._conventions |= zip(known, found, strict=True)
         convention = self._conventions.get(log)
         if convention is None:
             return seen
@@ -399,16 +375,12 @@ class Recordings:
     def summary(self, log: Recording) -> LogSummary:
         """The log as a result names it."""
         rows = self.whole(log).rows or 0
-        rate, digest = 0.0, None
+        rate = 0.0
         if log.duration > 0:
             rate = (rows - 1) / log.duration
-        if log._hash is not None:
-            digest = log._hash.result()
-        elif log.digest is not None:
-            digest = log.digest()
         return LogSummary(
             path=log.name,
-            sha256=digest,
+            sha256=None if log.digest is None else log.digest(),
             role=log.role,
             format=log.origin.format,
             rows=rows,
@@ -426,47 +398,43 @@ class Recordings:
         """
         from algid.inspection.channels import beyond, clipped
 
-        if log.digest is not None and log._hash is None and not 0 < log.promised <= SHORT:
-            log._hash = beside(log.digest)
-        first_pass = log.rows is None
-        rows, first_ns, last_ns = 0, 0, 0
-        notices = list(log.notices)
-        limits: tuple[Limit, ...] = ()
-        counts: list[int] = []
+        if log.limits is None and log.digest is not None and not 0 < log.promised <= SHORT:
+            log.digest = beside(log.digest).result
+        rows, last_ns, notices = 0, 0, list[Notice]()
+        counts: Counter[Limit] = Counter()
         self._report(log, 0)
         blocks = _with_end(log)
-        if log._begin is not None:
-            blocks, log._begin = iter([(log._begin, True)]), None
+        if log.begin is not None:
+            blocks, log.begin = iter([(log.begin, True)]), None
         for block, alone in blocks:
-            if len(block) and not rows:
-                first_ns = int(block.stamp_ns[0])
-                if log._findings is None:
-                    log._findings = self._examined(log, block, whole=alone)
-                notices += log._findings
-                limits = self._limits(log)
-                counts = [0] * len(limits)
-            more = beyond(block, limits)
-            counts = [count + own for count, own in zip(counts, more, strict=True)]
             if len(block):
-                last_ns = int(block.stamp_ns[-1])
-            rows += len(block)
+                if log.limits is None:
+                    log.limits = self._examined(log, block, whole=alone)
+                counts.update(beyond(block, log.limits))
+                rows, last_ns = rows + len(block), int(block.stamp_ns[-1])
             notices += block.notices
             yield block
             self._report(log, rows)
-        if first_pass:
-            notices += clipped(log.origin, limits, counts, rows)
-            log.notices = tuple(notices)
-            log.rows, log.first_ns, log.last_ns = rows, first_ns, last_ns
+        if log.rows is None:
+            log.notices += (*notices, *clipped(log.origin, counts, rows))
+            log.rows, log.last_ns = rows, last_ns
 
-    def _examined(self, log: Recording, block: Log, *, whole: bool) -> tuple[Notice, ...]:
-        """What the named checks find in the first block of a log."""
+    def _examined(self, log: Recording, block: Log, *, whole: bool) -> tuple[Limit, ...]:
+        """The limits of a log's torques; what the named checks find in its first block is noted.
+
+        Raises
+        ------
+        LogError
+            If a check refuses the log.
+        """
         from algid.inspection.checks import CONTRADICTIONS, admitted, examine
         from algid.inspection.conventions import judged
 
+        log.first_ns = int(block.stamp_ns[0])
         begin = block if whole else block.part(0, EXAMINED)
+        alike = self.loaded if log.role == "loaded" else self.unloaded
         if log.role not in self._known:
-            self._judge_arm(log, begin)
-        alike = [one for one in self.logs if one.role == log.role]
+            self._judge_arm(log, begin, alike)
         found = examine(
             begin,
             cache(partial(judged, begin, gravity=self._weight(log) > 0)),
@@ -475,29 +443,28 @@ class Recordings:
             alone=len(alike) == 1,
             known=self._known[log.role],
         )
-        notices = admitted(begin, found)
-        if len(alike) == 1 and any(one.code in CONTRADICTIONS for one in notices):
-            del self._known[log.role]  # of an arm that is not this one
-        return notices
+        log.notices += admitted(begin, found)
+        if len(alike) == 1 and has_code(found, *CONTRADICTIONS):
+            return ()  # of an arm that is not this one
+        return self._known[log.role].limits
 
-    def _judge_arm(self, log: Recording, begin: Log) -> None:
-        """Find the limits of torques of the role of `log`, and keep what conventions ask for."""
+    def _judge_arm(self, log: Recording, begin: Log, alike: Sequence[Recording]) -> None:
+        """Find the limits of torques of logs `alike`, and keep what conventions ask for."""
         from algid.estimators.convention_search import MOST_LOGS, seconds_of_each
         from algid.inspection.channels import saturation
         from algid.inspection.conventions import recorded
 
-        alike = [one for one in self.logs if one.role == log.role]
         begins = {log: begin}
         for other in evenly_spread(alike, MOST_LOGS):
             if other is not log:
                 for block, alone in islice(_with_end(other), 1):
-                    other._begin = block if alone else None  # so that it is not read again
+                    other.begin = block if alone else None  # so that it is not read again
                     begins[other] = block if alone else block.part(0, EXAMINED)
         known = saturation(*begins.values(), gravity=self._weight(log), effort=self._effort)
         self._known[log.role] = known
         if len(alike) > 1 and self._effort != "external":
             for one, samples in begins.items():
-                self._recorded[one] = recorded(samples, seconds_of_each(len(alike)))
+                one.recorded = recorded(samples, seconds_of_each(len(alike)))
 
     def _report(self, log: Recording, rows: int) -> None:
         """A pass over `log` has come as far as `rows` samples; 0 starts one.
@@ -506,28 +473,29 @@ class Recordings:
         """
         if self.progress is None:
             return
-        words = "reading" if log.rows is None else self._stage
-        if words != self._words or (rows == 0 and log in self._done):
-            self._words, self._done = words, {}
+        if rows == 0 and log in self._done:
+            self._done = {}
         self._done[log] = rows
         counts = [one.promised if one.rows is None else one.rows for one in self._over]
         # 0 where a log does not say how many samples it has
-        self.progress(words, sum(self._done.values()), sum(counts) if all(counts) else 0)
+        stage = "reading" if log.rows is None else self._stage
+        self.progress(stage, sum(self._done.values()), sum(counts) if all(counts) else 0)
 
 
 def _with_end(log: Recording) -> Iterator[tuple[Log, bool]]:
     """Each block of a log, and whether it is the only one.
 
-    Where more than twice its samples are promised it is not, and need not wait for the second one:
-    a reader refuses a log of which it would have to drop half.
+    Raises
+    ------
+    LogError
+        If the first is not sampled as an arm is.
     """
     blocks = log.blocks()
-    for first in islice(blocks, 1):
-        if log.promised > 2 * len(first):
-            yield first, False
-        else:
-            waited = list(islice(blocks, 1))
-            yield first, not waited
-            blocks = chain(waited, blocks)
-        for block in blocks:
-            yield block, False
+    begin = list(islice(blocks, 2))
+    if begin:
+        check_step(begin[0].origin.path, begin[0].stamp_ns)
+    alone = len(begin) == 1
+    while begin:
+        yield begin.pop(0), alone
+    for block in blocks:
+        yield block, False

@@ -6,7 +6,7 @@ Limits that cut torques off are found by motion, reported, and what lies beyond 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -263,17 +263,15 @@ def saturation(*logs: Log, gravity: float = 9.81, effort: str | None = None) -> 
     return saturation_of(pieces, gravity)
 
 
-def beyond(log: Log, limits: Sequence[Limit]) -> list[int]:
+def beyond(log: Log, limits: Iterable[Limit]) -> dict[Limit, int]:
     """How many samples of a log, or of a block of it, lie beyond each of its limits."""
-    return [int(np.count_nonzero(limit.beyond(log.tau))) for limit in limits]
+    return {limit: int(np.count_nonzero(limit.beyond(log.tau))) for limit in limits}
 
 
-def clipped(
-    origin: Origin, limits: Sequence[Limit], counts: Sequence[int], rows: int
-) -> Iterator[Notice]:
-    """Limits beyond which `counts` samples of `rows` lie."""
+def clipped(origin: Origin, counts: Mapping[Limit, int], rows: int) -> Iterator[Notice]:
+    """Limits beyond which so many samples of `rows` lie."""
     keep = Remedy({"accept": "CLIPPED_TORQUE"}, "to use them nevertheless")
-    for limit, count in zip(limits, counts, strict=True):
+    for limit, count in counts.items():
         if count:
             level = max(abs(side) for side in (limit.low, limit.high) if np.isfinite(side))
             seen = {"level": level, "count": count, "percent": 100 * count / rows}

@@ -126,7 +126,7 @@ def inspect_log(log: Any, profile: Profile | None = None) -> Inspection:
     tried = cache(partial(judged, log, gravity=own.gravity > 0))
     findings = (
         *examine(log, tried, effort=own.effort, known=known),
-        *clipped(log.origin, known.limits, beyond(log, known.limits), len(log)),
+        *clipped(log.origin, beyond(log, known.limits), len(log)),
     )
     reasons = [f"{one.code}: {one.clause}" for one in findings if one.refuse]
     every = channels(log, ("theta", "tau", "omega"))

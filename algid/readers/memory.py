@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
@@ -29,16 +28,6 @@ def is_columns(given: object) -> TypeGuard[FrameOrArrays]:
     """Whether columns are given: a mapping, or an object that exports Arrow, as frames do."""
     return isinstance(given, Mapping) or any(
         hasattr(given, name) for name in ("__arrow_c_stream__", "__dataframe__")
-    )
-
-
-def refuse_others(given: object) -> None:
-    """Raises `LogError` for what is neither a path nor columns, as an array without a name."""
-    if isinstance(given, str | Path) or is_columns(given):
-        return
-    raise LogError(
-        f"{NAME}: expected a path, a Log, a frame or a dict of arrays, found "
-        f"{type(given).__name__}; arrays become a log by algid.Log.from_arrays(t, theta, tau)"
     )
 
 
@@ -141,9 +130,13 @@ def open_columns(given: FrameOrArrays) -> TableFile:
     Raises
     ------
     LogError
-        If the columns cannot be taken over.
+        If these are no columns, as an array without a name, or they cannot be taken over.
     """
-    refuse_others(given)
+    if not is_columns(given):
+        raise LogError(
+            f"{NAME}: expected a path, a Log, a frame or a dict of arrays, found "
+            f"{type(given).__name__}; arrays become a log by algid.Log.from_arrays(t, theta, tau)"
+        )
     if isinstance(given, Mapping):
         arrays = {}
         for name, values in given.items():
