@@ -34,6 +34,7 @@ k, V    what both say, its covariance          (n, n)
 
 from __future__ import annotations
 
+import cmath
 import math
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, replace
@@ -41,7 +42,7 @@ from pathlib import Path
 
 import numpy as np
 
-from algid.arm import Arm, FloatArray
+from algid.arm import CONSTANT_NAMES, Arm, FloatArray
 from algid.base.criteria import SAME_LENGTH, STILL
 from algid.base.errors import ResultError, SettingError
 from algid.base.files import read_text
@@ -54,7 +55,7 @@ from algid.estimators.identifiability import SHARE, open_directions
 from algid.identification.known import covariance_of, with_error_bar
 from algid.identification.recordings import Role
 from algid.identification.series import Predictor
-from algid.model import RIGID, SINES, TERMS, UNITS, Model
+from algid.model import F1, F2, RIGID, SINES, UNITS, Model
 from algid.notices import Notice
 from algid.options import flag
 from algid.physics.effort import absent
@@ -77,15 +78,9 @@ class Statement:
     mean: FloatArray
     covariance: FloatArray
 
-    def without(self, names: tuple[str, ...]) -> Statement:
-        """What it says of the other constants, whatever those of the `names` are."""
-        kept = places_outside(self.names, names)
-        covariance = self.covariance[np.ix_(kept, kept)]
-        return Statement(self.file, outside(self.names, names), self.mean[kept], covariance)
-
 
 def statement_of(settings: Settings) -> Statement | None:
-    """What the settings' prior says of the constants that the torque holds; None without one.
+    """What the settings' prior says of k1 … k5; None without one.
 
     Raises
     ------
@@ -100,39 +95,31 @@ def statement_of(settings: Settings) -> Statement | None:
     if Path(file).suffix.lower() == ".urdf":
         arm = replace(arm_of(Path(file))[0], g=settings.gravity)
         covariance = drawn_covariance(arm, (ERROR if error is None else error) / 100)
-        said = Statement(file, RIGID, arm.constants()[: len(RIGID)], covariance)
-    else:
-        if error is not None:
-            raise SettingError(
-                f"{flag('prior_error')}: {file} is a result, which has error bars; leave it out"
-            )
-        try:
-            result = read_result(file)
-        except ResultError as wrong:
-            raise ResultError(f"{flag('prior')}: no URDF by its name, and {wrong}") from wrong
-        names = with_error_bar(result, RIGID)
-        if not names:
-            raise ResultError(f"{file}: the result has no error bars of k1 … k5; give another one")
-        value = {name: result.parameters[name].estimate or 0.0 for name in names}
-        said = Statement(file, names, vector(names, value), covariance_of(result, names, names))
-    gone = absent(settings.effort, RIGID)
-    if settings.gravity == 0:
-        gone += absent("gravity-compensated", RIGID)
-    return said.without(gone)
+        return Statement(file, RIGID, arm.constants()[: len(RIGID)], covariance)
+    if error is not None:
+        raise SettingError(
+            f"{flag('prior_error')}: {file} is a result, which has error bars; leave it out"
+        )
+    try:
+        result = read_result(file)
+    except ResultError as wrong:
+        raise ResultError(f"{flag('prior')}: no URDF by its name, and {wrong}") from wrong
+    names = with_error_bar(result, RIGID)
+    if not names:
+        raise ResultError(f"{file}: the result has no error bars of k1 … k5; give another one")
+    mean = np.array([result.parameters[name].estimate for name in names], dtype=np.float64)
+    return Statement(file, names, mean, covariance_of(result, names, names))
 
 
 def drawn_covariance(arm: Arm, error: float) -> FloatArray:
     """Covariance P (5, 5) of k1 … k5 of a drawn arm, of which masses and more err by that share."""
     moves = []
+    I1, I2 = max(arm.I1, 0.0), max(arm.I2, 0.0)  # a file may round them below nothing
+    gyration = {"lc1": math.sqrt(I1 / arm.m1), "lc2": math.sqrt(I2 / arm.m2)}
     for name in ("m1", "m2", "lc1", "lc2", "I1", "I2", "l1"):
         value = getattr(arm, name)
-        step = error * abs(value)
-        if name == "l1":
-            step = SAME_LENGTH * value
-        elif name in ("lc1", "lc2"):
-            number = name[-1]
-            gyration = np.sqrt(getattr(arm, f"I{number}") / getattr(arm, f"m{number}"))
-            step = error * max(abs(value), float(gyration))
+        share = SAME_LENGTH if name == "l1" else error
+        step = share * max(abs(value), gyration.get(name, 0.0))
         # the constants are polynomials of second order in each: central differences are exact
         more, less = (replace(arm, **{name: value + sign * step}) for sign in (1, -1))
         moves.append((more.constants() - less.constants())[: len(RIGID)] / 2)
@@ -151,17 +138,18 @@ def with_prior(fit: Fit, said: Statement) -> Fit:
         Of logs alone, with its doubts.
     said : Statement
     """
-    said = said.without(outside(said.names, outside(fit.names, fit.absent)))
-    if not fit.converged or not said.names:
+    names = within(said.names, outside(fit.names, fit.absent))
+    if not fit.converged or not names:
         return fit
-    places = [fit.names.index(name) for name in said.names]
-    others = places_outside(range(len(fit.names)), places)
-    W, P, m = fit.covariance, said.covariance, said.mean
+    kept = list(map(said.names.index, names))
+    P, m = said.covariance[np.ix_(kept, kept)], said.mean[kept]
+    places = list(map(fit.names.index, names))
+    W, own = fit.covariance, np.ix_(places, places)
     # an arm at rest tells its weight: what noise makes of accelerations is no inertia
     weight = absent("gravity-compensated", RIGID) if (fit.moved < STILL).all() else RIGID
     doubtful = [fit.status[p] != "OK" or fit.names[p] not in weight for p in places]
     B = _determined(fit, places, doubtful)
-    J = B @ scaled_pinv(B.T @ W[np.ix_(places, places)] @ B) @ B.T
+    J = B @ scaled_pinv(B.T @ W[own] @ B) @ B.T
     V = scaled_pinv(J + scaled_pinv(P))
     k = m + V @ J @ (fit.values[places] - m)
     # P − V, how far logs are expected to move the constants
@@ -173,28 +161,26 @@ def with_prior(fit: Fit, said: Statement) -> Fit:
     if chance(float(distance[most]), len(places)) < LEVEL:
         numbers = {
             "case": "prior",
-            "name": said.names[most],
+            "name": names[most],
             "file": said.file,
             "given": float(m[most]),
             "std": float(std[most]),
-            "unit": UNITS[said.names[most]],
+            "unit": UNITS[names[most]],
             "estimate": float(k[most]),
             "distance": float(distance[most]),
         }
         return fit.noted(Notice("OTHER_ARM", numbers=numbers))
-    values, covariance = fit.values.copy(), W.copy()
-    A = W[np.ix_(others, places)] @ J
-    values[places] = k
-    values[others] += A @ (k - fit.values[places])
-    covariance[np.ix_(places, places)] = V
-    covariance[np.ix_(others, places)] = A @ V
-    covariance[np.ix_(places, others)] = (A @ V).T
-    covariance[np.ix_(others, others)] -= A @ (W[np.ix_(places, places)] - V) @ A.T
+    # A: how all parameters follow these; rest: the covariance that these leave the others
+    A = W[:, places] @ J
+    rest = W - A @ W[own] @ A.T
+    rest[places] = rest[:, places] = 0.0
+    A[places] = np.eye(len(places))
+    values = fit.values + A @ (k - fit.values[places])
     status = list(fit.status)
-    for place, vague, own, before in zip(places, doubtful, np.diag(V), np.diag(P), strict=True):
-        if vague or own > _HALF * before:
+    for place, vague, now, before in zip(places, doubtful, np.diag(V), np.diag(P), strict=True):
+        if vague or now > _HALF * before:
             status[place] = "FROM_PRIOR"
-    return replace(fit, values=values, covariance=covariance, status=tuple(status))
+    return replace(fit, values=values, covariance=rest + A @ V @ A.T, status=tuple(status))
 
 
 def _determined(fit: Fit, places: list[int], doubtful: list[bool]) -> FloatArray:
@@ -250,15 +236,12 @@ def read_urdf(path: Path, profile: Profile | None = None) -> Predictor:
     profile = profile or Profile()
     arm, friction = arm_of(path)
     arm = replace(arm, g=arm.g * profile.gravity / GRAVITY)  # g is of the share in its plane
-    jump = next(term for term in TERMS.values() if term.friction)
-    terms = [jump.name] if any(friction) else []
-    if max(abs(arm.delta1), abs(arm.delta2)) > _BESIDE:
-        terms += [name for name, term in TERMS.items() if term.sines]
-    model = Model(tuple(terms), gravity=arm.g)
-    value = {f"k{number}": float(k) for number, k in enumerate(arm.constants(), start=1)}
-    value |= dict(zip((*SINES, *jump.names), (*map(float, arm.sines()), *friction), strict=True))
-    value |= dict.fromkeys(absent(profile.effort, model.names), 0.0)
-    c = np.array([value[name] for name in model.names])
+    bent = max(abs(arm.delta1), abs(arm.delta2)) > _BESIDE
+    terms = ("coulomb",) * any(friction) + ("phases",) * bent
+    model = Model(terms, gravity=arm.g)
+    numbers = np.concatenate([arm.constants(), arm.sines(), friction])
+    value = dict(zip((*CONSTANT_NAMES, *SINES, F1, F2), numbers.tolist(), strict=True))
+    c = vector(model.names, value | dict.fromkeys(absent(profile.effort, model.names), 0.0))
 
     def coefficients(role: Role) -> FloatArray:
         if role == "loaded":
@@ -309,11 +292,14 @@ def _arm(robot: ET.Element) -> tuple[Arm, tuple[float, ...]]:
     axes = []
     for name in names:
         direction = np.array(_numbers(joints[name], "axis", "xyz", "1 0 0", 3))
-        length = np.linalg.norm(direction)
-        if length == 0:
+        size = np.linalg.norm(direction)
+        if size == 0:
             raise ValueError("a joint's axis has no direction")
-        axes.append(frames[name][:3, :3] @ direction / length)
+        axes.append(frames[name][:3, :3] @ direction / size)
     about = axes[0]
+    # the plane of motion, counterclockwise about the axis, as complex numbers
+    across = np.linalg.svd(about[None])[2][1]
+    plane = across + 1j * np.cross(about, across)
     if np.linalg.norm(np.cross(*axes)) > _PARALLEL:
         raise ValueError("the joints' axes are not parallel")
     last, tip = {parent[name]: name for name in joints}, names[1]
@@ -322,35 +308,35 @@ def _arm(robot: ET.Element) -> tuple[Arm, tuple[float, ...]]:
     places = [frames[name][:3, 3] for name in (*names, tip)]
     numbers: dict[str, float] = {}
     for number, (name, joint) in enumerate(zip(names, places[:2], strict=True), start=1):
-        mass, moment, inertia = 0.0, np.zeros(3), 0.0  # about the joint's axis
+        mass, moment, inertia = 0.0, 0j, 0.0  # about the joint's axis
         for link, frame in frames.items():
             if behind[link] == number and links[link].find("inertial") is not None:
                 own, second, m = _inertial(links[link])
                 body = frame @ own
-                across, r = body[:3, :3].T @ about, body[:3, 3] - joint
-                inertia += float(across @ second @ across + m * (r @ r - (about @ r) ** 2))
+                axis, r = body[:3, :3].T @ about, complex((body[:3, 3] - joint) @ plane)
+                inertia += float(axis @ second @ axis) + m * abs(r) ** 2
                 mass, moment = mass + m, moment + m * r
         if mass <= 0:
             raise ValueError(f"link {name} has no mass")
-        line = places[number] - joint
-        if number == 2 and not line.any():  # no frame is the tip: the centre of mass
+        to_next = places[number] - joint
+        line = complex(to_next @ plane)
+        if number == 2 and not to_next.any():  # no frame is the tip: the centre of mass
             line = moment / mass
-        line = line - about * (about @ line)
-        length = np.linalg.norm(line)
+        length = abs(line)
         if length <= _ROUNDING:
             raise ValueError(f"link {name} has no length across its axis")
-        along, beside = (x @ moment / mass / length for x in (line, np.cross(about, line)))
+        centre = moment / mass * line.conjugate() / length
         # a centre behind the joint has a negative distance
-        far = math.copysign(math.hypot(along, beside), along)
+        far = math.copysign(abs(centre), centre.real)
         numbers |= {
             f"m{number}": mass,
-            f"l{number}": float(length),
+            f"l{number}": length,
             f"lc{number}": far,
             f"I{number}": inertia - mass * far**2,
-            f"delta{number}": math.atan2(beside * math.copysign(1.0, along), abs(along)),
+            f"delta{number}": cmath.phase(centre * math.copysign(1.0, far)),
             f"b{number}": _numbers(joints[name], "dynamics", "damping", "0")[0],
         }
-    tilt = math.sqrt(max(0.0, 1 - float(about[2]) ** 2))
+    tilt = math.hypot(*about[:2])
     friction = [_numbers(joints[name], "dynamics", "friction", "0")[0] for name in names]
     return Arm(**numbers, g=GRAVITY * tilt if tilt > _PARALLEL else 0.0), tuple(friction)
 
@@ -377,21 +363,18 @@ def _numbers(
 
 def _inertial(link: ET.Element) -> tuple[FloatArray, FloatArray, float]:
     """The frame (4, 4) of a link's centre of mass, the inertia (3, 3) about it, and its mass."""
-
-    def moment(a: str, b: str) -> float:
-        return _numbers(link, "inertial/inertia", "i" + "".join(sorted(a + b)))[0]
-
-    inertia = np.array([[moment(a, b) for b in "xyz"] for a in "xyz"])
-    return (_origin(link, "inertial/origin"), inertia, _numbers(link, "inertial/mass", "value")[0])
+    rows = (("ixx", "ixy", "ixz"), ("ixy", "iyy", "iyz"), ("ixz", "iyz", "izz"))
+    inertia = [[_numbers(link, "inertial/inertia", name)[0] for name in row] for row in rows]
+    (mass,) = _numbers(link, "inertial/mass", "value")
+    return _origin(link, "inertial/origin"), np.array(inertia), mass
 
 
 def _origin(element: ET.Element, path: str) -> FloatArray:
     """The origin (4, 4) at `path`: roll, pitch, yaw about fixed axes, and its place."""
-    frame = np.eye(4)
-    for axis, angle in enumerate(_numbers(element, path, "rpy", "0 0 0", 3)):
-        turn, rows = np.eye(3), [(axis + 1) % 3, (axis + 2) % 3]
-        c, s = math.cos(angle), math.sin(angle)
-        turn[np.ix_(rows, rows)] = [[c, -s], [s, c]]
+    frame, axes = np.eye(4), np.eye(3)
+    for axis, angle in zip(axes, _numbers(element, path, "rpy", "0 0 0", 3), strict=True):
+        c, s = math.cos(angle), math.sin(angle)  # Rodrigues' formula
+        turn = c * axes + s * np.cross(axes, axis) + (1 - c) * np.outer(axis, axis)
         frame[:3, :3] = turn @ frame[:3, :3]
     frame[:3, 3] = _numbers(element, path, "xyz", "0 0 0", 3)
     return frame
