@@ -24,7 +24,7 @@ import itertools
 import json
 import math
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal
@@ -309,11 +309,7 @@ class Log:
 
     def part(self, first: int, last: int) -> Log:
         """Samples `first` to `last` - 1 of this log, as views."""
-        signals = {name: getattr(self, name) for name in SIGNALS}
-        cut: dict[str, Any] = {
-            name: signal if signal is None else signal[:, first:last]
-            for name, signal in signals.items()
-        }
+        cut = signals_of(self, lambda signal: signal[:, first:last])
         return replace(self, stamp_ns=self.stamp_ns[first:last], **cut)
 
 
@@ -372,19 +368,29 @@ def join(blocks: Iterable[Log]) -> Log:
         raise ValueError("a log needs at least one block, got none")
     if len(parts) == 1:
         return parts[0]
-    whole: dict[str, Any] = {
-        name: joined([getattr(one, name) for one in parts]) for name in SIGNALS
-    }
-    whole["stamp_ns"] = np.concatenate([part.stamp_ns for part in parts])
-    return replace(parts[0], notices=sum((part.notices for part in parts), ()), **whole)
+    stamps = np.concatenate([part.stamp_ns for part in parts])
+    notices = sum((part.notices for part in parts), ())
+    return replace(parts[0], stamp_ns=stamps, notices=notices, **joined(parts))
 
 
-def joined(parts: Sequence[FloatArray | None]) -> FloatArray | None:
-    """A signal that not every log has, (2, N), out of its parts; None where one lacks it."""
-    known = [part for part in parts if part is not None]
-    if not known or len(known) < len(parts):
-        return None
-    return np.concatenate(known, axis=1)
+def joined(parts: Sequence[object]) -> dict[str, Any]:
+    """By name each signal of logs, or of stretches of one; None where one of them lacks it."""
+    signals = {}
+    for name in SIGNALS:
+        own = [getattr(part, name) for part in parts]
+        lacking = any(signal is None for signal in own)
+        signals[name] = None if lacking else np.concatenate(own, axis=1)
+    return signals
+
+
+def signals_of(log: object, change: Callable[[FloatArray], FloatArray]) -> dict[str, Any]:
+    """By name each signal that a log, or a stretch of one, has, changed."""
+    signals = {}
+    for name in SIGNALS:
+        signal = getattr(log, name)
+        if signal is not None:
+            signals[name] = change(signal)
+    return signals
 
 
 KEY = "algid"

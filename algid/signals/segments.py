@@ -10,15 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import chain, pairwise
-from typing import Any
+from itertools import chain, pairwise, permutations
 
 import numpy as np
 
 from algid.arm import FloatArray, keep_arrays
 from algid.base.criteria import CUT
-from algid.log import SIGNALS, IntArray, Log, join, joined, usual_period
-from algid.signals.spacing import signals_of, spaced
+from algid.log import IntArray, Log, join, joined, signals_of, usual_period
+from algid.signals.spacing import spaced
 
 _ENDLESS = 1 << 62  # samples: more than any stretch has
 PERIOD_SAMPLES = 4096  # the first samples, from which the period is taken
@@ -65,14 +64,11 @@ class Segment:
     def part(self, first: int, last: int) -> Segment:
         """Samples `first` to `last` - 1 as views; it continues the part before it."""
         return replace(
-            self.of_signals(lambda signal: signal[:, first:last]),
+            self,
             start=self.start + first * self.dt,
             continues=self.continues or first > 0,
+            **signals_of(self, lambda signal: signal[:, first:last]),
         )
-
-    def of_signals(self, change: Callable[[FloatArray], FloatArray]) -> Segment:
-        """The same with each signal that it has changed."""
-        return replace(self, **signals_of(self, change))
 
 
 def segments(blocks: Iterable[Log]) -> Iterator[Segment]:
@@ -131,39 +127,21 @@ def _at(log: Log, t: FloatArray, grid: FloatArray, dt: float) -> Segment:
     """A log with samples at `t` at the instants of `grid`."""
     first = int(np.searchsorted(t, grid[0] - 0.5 * dt))
     own = slice(first, first + grid.size)
-    if _alike(t[own], grid, EVEN * dt):
+    if t[own].size == grid.size and np.abs(t[own] - grid).max() <= EVEN * dt:
         return Segment(float(grid[0]), dt, **signals_of(log, lambda signal: signal[:, own]))
-    weights = _cubic(t, grid)
-
-    def between(signal: FloatArray) -> FloatArray:
-        values = np.zeros((2, grid.size))
-        for place, weight in weights:
-            values += weight * signal[:, place]
-        return values
-
-    return Segment(float(grid[0]), dt, **signals_of(log, between))
+    places, weights = _cubic(t, grid)
+    between = signals_of(log, lambda signal: np.sum(weights * signal.take(places, axis=1), axis=1))
+    return Segment(float(grid[0]), dt, **between)
 
 
-def _alike(t: FloatArray, grid: FloatArray, reach: float) -> bool:
-    """Whether there are as many times as instants, each within `reach` of its own."""
-    if t.size != grid.size:
-        return False
-    off = t - grid
-    return bool(off.max() <= reach and off.min() >= -reach)
-
-
-def _cubic(t: FloatArray, grid: FloatArray) -> list[tuple[IntArray, FloatArray]]:
-    """Lagrange's cubic around each instant of `grid`: its four samples and their weights."""
+def _cubic(t: FloatArray, grid: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Lagrange's cubic around each instant of `grid`: its four samples and their weights (4, n)."""
     corner = np.clip(np.searchsorted(t, grid, side="right") - 2, 0, t.size - 4)
-    nodes = t[corner[:, None] + np.arange(4)]
-    weights: list[tuple[IntArray, FloatArray]] = []
-    for node in range(4):
-        weight: FloatArray = np.ones(grid.size)
-        for other in range(4):
-            if other != node:
-                weight *= (grid - nodes[:, other]) / (nodes[:, node] - nodes[:, other])
-        weights.append((corner + node, weight))
-    return weights
+    places = np.arange(4)[:, None] + corner
+    nodes, weights = t[places], np.ones(places.shape)
+    for node, other in permutations(range(4), 2):
+        weights[node] *= (grid - nodes[other]) / (nodes[node] - nodes[other])
+    return places, weights
 
 
 def pieces(
@@ -226,8 +204,8 @@ def spread_pieces(usable: Iterable[Segment], count: int, rows: int) -> tuple[lis
     for index, piece in enumerate(usable):
         if index % stride:
             continue
-        copy = piece.of_signals(np.copy)
-        kept.append(replace(copy, continues=piece.continues and stride == 1))
+        follows = piece.continues and stride == 1
+        kept.append(replace(piece, continues=follows, **signals_of(piece, np.copy)))
         if len(kept) > 2 * count and sum(map(len, kept)) > 2 * count * rows:
             kept, stride = [replace(other, continues=False) for other in kept[::2]], 2 * stride
     return kept, stride == 1
@@ -261,7 +239,4 @@ def settled(
 
 def append(first: Segment, second: Segment) -> Segment:
     """One segment out of two, the second of which continues the first."""
-    signals: dict[str, Any] = {}
-    for name in SIGNALS:
-        signals[name] = joined([getattr(first, name), getattr(second, name)])
-    return replace(first, **signals)
+    return replace(first, **joined([first, second]))

@@ -17,14 +17,13 @@ size     samples of each cluster               (C,)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.log import SIGNALS, IntArray, Log, join
+from algid.log import IntArray, Log, join, signals_of
 
 NEAR = 0.3
 """Periods: nodes of a cubic this far apart still carry noise of at most twice one sample's."""
@@ -49,16 +48,6 @@ def spaced(blocks: Iterable[Log], period: float) -> Iterator[Log]:
     yield _settled(join(held), before, period)
 
 
-def signals_of(log: object, change: Callable[[FloatArray], FloatArray]) -> dict[str, Any]:
-    """By name each signal that a log has, changed."""
-    signals = {}
-    for name in SIGNALS:
-        signal = getattr(log, name)
-        if signal is not None:
-            signals[name] = change(signal)
-    return signals
-
-
 def near_stamps(stamp_ns: IntArray, period: float) -> int:
     """Number of samples of a log (N,) less than `NEAR` of a `period` in s after the one before."""
     return int(np.count_nonzero(np.diff(stamp_ns) < NEAR * period * 1e9))
@@ -69,27 +58,23 @@ def _settled(log: Log, before: Log | None, period: float) -> Log:
 
     `before` is the sample before the first of them.
     """
-    far = np.diff(log.stamp_ns) >= NEAR * period * 1e9
-    if np.all(far):
+    if not near_stamps(log.stamp_ns, period):
         return log
-    first = np.concatenate([[0], np.flatnonzero(far) + 1])
-    size = np.diff(first, append=len(log))
-    # nothing shows whether the log's first samples are late: the last one is not
-    if before is None and size[0] > 1:
-        return _settled(log.part(int(size[0]) - 1, len(log)), None, period)
     known = log if before is None else join([before, log])
-    shift = len(known) - len(log)
-    stamps, kept = log.stamp_ns.copy(), np.isin(np.arange(len(log)), first)
+    first = np.append(0, np.flatnonzero(np.diff(known.stamp_ns) >= NEAR * period * 1e9) + 1)
+    size = np.diff(first, append=len(known))
+    # nothing shows whether the log's first samples are late: the last one is not
+    if size[0] > 1:
+        return _settled(log.part(int(size[0]) - 1, len(log)), None, period)
+    stamps, kept = known.stamp_ns.copy(), np.isin(np.arange(len(known)), first)
     for start, own in zip(first[size > 1].tolist(), size[size > 1].tolist(), strict=True):
-        if start + shift > 0 and _late(
-            around := known.part(start + shift - 1, start + shift + own), period
-        ):
-            regular = around.stamp_ns[0] + np.rint(np.arange(1, own + 1) * period * 1e9).astype(
-                np.int64
-            )
-            stamps[start : start + own] = np.minimum(regular, stamps[start : start + own])
+        if _late(known.part(start - 1, start + own), period):
+            later = np.rint(np.arange(1, own + 1) * period * 1e9).astype(np.int64)
+            cluster = stamps[start : start + own]
+            cluster[:] = np.minimum(known.stamp_ns[start - 1] + later, cluster)
             kept[start : start + own] = True
-    return _merged(replace(log, stamp_ns=stamps), np.flatnonzero(kept))
+    whole = _merged(replace(known, stamp_ns=stamps), np.flatnonzero(kept))
+    return whole if before is None else whole.part(1, len(whole))
 
 
 def _late(cluster: Log, period: float) -> bool:
