@@ -117,17 +117,15 @@ def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
             f"identify with {flag('estimator')} refined or weak, or use {flag('estimator')} paper "
             "here too"
         )
-    known = set(result.fit.covariance_names) & set(result.parameters)
-    gone = untold(result, model)
-    names = outside(model.names, gone)
-    missing = outside(names, known)
+    names = outside(model.names, untold(result, model))
+    missing = outside(names, within(result.fit.covariance_names, result.parameters))
     if missing:
         raise ResultError(
             f"{file}: the result has no {', '.join(missing)}; use the flags it was made with"
         )
     covariance = result.fit.covariance_of(names)
     mean = np.array([result.parameters[name].estimate for name in names], dtype=np.float64)
-    if not (np.isfinite(covariance).all() and np.isfinite(mean).all()):
+    if not np.isfinite([*covariance, mean]).all():
         raise ResultError(
             f"{file}: the result leaves constants undetermined; identify from more logs first"
         )
@@ -152,20 +150,15 @@ def torque_constants(result: Result, model: Model, role: Role, file: str) -> Flo
     ResultError
         If one of them has no estimate.
     """
-    known: dict[str, float] = {}
-    for name, one in (result.parameters | result.payload).items():
-        if one.estimate is not None:
-            known[name] = one.estimate
-    known |= dict.fromkeys(untold(result, model), 0.0)
-    known |= given_lengths(result)
+    every = (result.parameters | result.payload).items()
+    known = {name: one.estimate for name, one in every if one.estimate is not None}
+    known |= dict.fromkeys(untold(result, model), 0.0) | given_lengths(result)
     loaded = role == "loaded"
-    body = within(BODY_PARAMETERS, known)
-    shared = Shared(model, payload=loaded, body=body)
-    for name in shared.names:
-        if name not in known:
-            raise ResultError(
-                f"{file}: the result has no {name}; identify it from logs that determine it"
-            )
+    shared = Shared(model, payload=loaded, body=within(BODY_PARAMETERS, known))
+    for name in outside(shared.names, known):
+        raise ResultError(
+            f"{file}: the result has no {name}; identify it from logs that determine it"
+        )
     return shared.coefficients(vector(shared.names, known), loaded)
 
 
@@ -201,9 +194,10 @@ def covariance_of(result: Result, names: Sequence[str], uncertain: Collection[st
         If the result does not know it.
     """
     covariance = np.zeros((len(names), len(names)))
-    rows = np.flatnonzero(np.isin(names, list(uncertain)))
-    if rows.size and result.fit is not None:
-        covariance[np.ix_(rows, rows)] = result.fit.covariance_of(within(names, uncertain))
+    if result.fit is not None:
+        unsure = np.isin(names, list(uncertain))
+        known = result.fit.covariance_of(names)
+        covariance = np.where(unsure & unsure[:, None], known, covariance)
     if np.isnan(covariance).any():
         of = ", ".join(within(names, uncertain))
         raise ResultError(f"{result.log.path}: its result has no covariance of {of}; identify anew")
@@ -224,11 +218,10 @@ def by_constants(result: Result) -> tuple[float, float, dict[str, float]] | None
     l1 = length_by_coupling(value, gravity) if {K1, K2} <= set(names) else None
     if l1 is None or result.fit is None:
         return None
-    slopes = {}
+    slopes = dict[str, float]()
     for name, power in ((K1, 1), (K2, -1)):
-        moment = phasor_of(value, name)
-        slopes[name] = power * l1 * moment.real / abs(moment) ** 2
-        slopes[SINE_OF[name]] = power * l1 * moment.imag / abs(moment) ** 2
+        slope_of = power * l1 / phasor_of(value, name).conjugate()
+        slopes |= {name: slope_of.real, SINE_OF[name]: slope_of.imag}
     slope = vector(names, slopes)
     std = float(np.sqrt(slope @ result.fit.covariance_of(names) @ slope))
     return l1, std, {name: slopes[name] for name in names}
@@ -274,17 +267,15 @@ def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice
         identified["l1"] = of_arm[:2]
     notices = [one for one in gain_notes(result.fit) if not one.note]
     for name, given in lengths.items():
-        numbers = {"name": name, "given": given}
-        if name in stated:
-            if not isclose(given, stated[name], rel_tol=SAME_LENGTH):
-                numbers |= {"case": "stated", "stated": stated[name]}
-                notices.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
-            continue
+        numbers: dict[str, Any] = {}
         estimate, std = identified.get(name, (None, None))
-        if estimate is None or not std:
-            continue
-        if said := contradicting(name, given, estimate, std, result.quantile):
-            notices.append(Notice("LENGTH_CONTRADICTED", numbers=said))
+        if name not in stated:
+            if estimate is not None and std:
+                numbers = contradicting(name, given, estimate, std, result.quantile)
+        elif not isclose(given, stated[name], rel_tol=SAME_LENGTH):
+            numbers = {"case": "stated", "name": name, "given": given, "stated": stated[name]}
+        if numbers:
+            notices.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
     return tuple(notices)
 
 

@@ -47,23 +47,20 @@ def problem_of(
 
     Segments have velocities only where they are not observed on the way.
     """
+    own = settings.velocity == "measured" or settings.luenberger
     windows = WeakSettings(
         model=chosen.model,
-        bandwidth=settings.bandwidth,
+        bandwidth=None if own else settings.bandwidth,
         shift=TorqueShift(chosen.hold == "zoh", settings.delay),
         estimate_delay=chosen.delay,
     )
-    own = settings.velocity == "measured" or settings.luenberger
-    if own:
-        windows = replace(windows, bandwidth=None)
     if settings.window is not None:
         windows = replace(windows, window=settings.window)
 
     def passed(log: Recording) -> Source:
-        moving: Source = partial(survey.segments, log)
         if own:
-            moving = partial(with_velocities, survey, log, settings)
-        return moving
+            return partial(with_velocities, survey, log, settings)
+        return partial(survey.segments, log)
 
     known = without(prior, absent(settings.effort, chosen.model.names))
     known = with_rotors(known, chosen.model)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -110,10 +111,8 @@ def scored_blocks(survey: Recordings, known: Predictor) -> Iterator[dict[str, Fl
     for number, log in enumerate(survey.logs):
         c = known.coefficients(log.role)
         for piece in scored_torque(known.model, c, survey.segments(log), known.shift):
-            step = 1
-            if piece.t.size > 1:
-                dt = float(piece.t[1] - piece.t[0])
-                step = max(1, int(1 / (SCORED_RATE * CUTOFF * dt)))
+            dt = float(piece.t[1] - piece.t[0])
+            step = max(1, int(1 / (SCORED_RATE * CUTOFF * dt)))
             t, X = piece.t[::step], piece.X[:, :, ::step]
             rows = np.concatenate([X[:, -1], np.einsum("q,aqn->an", c, X[:, :-1])])
             yield {
@@ -132,22 +131,16 @@ def write_columns(
     """Write blocks of flat columns as one Parquet file, each log's first stamp in its metadata."""
     import pyarrow.parquet
 
-    writer: pyarrow.parquet.ParquetWriter | None = None
-    try:
-        for block in blocks:
-            table = table_of_columns(block)
-            if writer is None:
-                schema = table.schema.with_metadata({START_KEY: json.dumps(list(start_ns))})
-                # floats of an estimate hardly ever repeat: a dictionary would only cost time
-                writer = pyarrow.parquet.ParquetWriter(
-                    path, schema, compression="zstd", use_dictionary=False
-                )
-            if not table.schema.equals(writer.schema):
-                table = table.cast(writer.schema)  # which imports all of pyarrow's functions
-            writer.write_table(table)
-    finally:
-        if writer is not None:
-            writer.close()
+    tables = map(table_of_columns, blocks)
+    for first in islice(tables, 1):
+        schema = first.schema.with_metadata({START_KEY: json.dumps(list(start_ns))})
+        # floats of an estimate hardly ever repeat: a dictionary would only cost time
+        way = {"compression": "zstd", "use_dictionary": False}
+        with pyarrow.parquet.ParquetWriter(path, schema, **way) as writer:
+            for table in chain([first], tables):
+                if not table.schema.equals(schema):
+                    table = table.cast(schema)  # which imports all of pyarrow's functions
+                writer.write_table(table)
 
 
 def information_blocks(fit: Fit, durations: Sequence[float]) -> Iterator[dict[str, FloatArray]]:
@@ -177,26 +170,27 @@ def innovation_rows(sums: ResidualSums, *, whitened: bool) -> Iterator[dict[str,
     through the same windows.
     """
     r = autocorrelation(sums)
-    kinds = [(AUTOCORRELATION, r.lag, r.correlation, -r.half, r.half)]
     if whitened:
         white = whiteness_of(sums)
-        band = white.low * np.ones((2, 1)), white.high * np.ones((2, 1))
-        kinds.insert(0, (WHITE_SPECTRUM, white.frequency, white.density, *band))
+        kinds = [(WHITE_SPECTRUM, white.frequency, white.density, white.low, white.high)]
     else:
-        plain = spectra(sums)
-        band = (np.full((2, plain.frequency.size), np.nan),) * 2
-        kinds.insert(0, (TORQUE_SPECTRUM, plain.frequency, plain.density[2:], *band))
-        kinds.insert(0, (SPECTRUM, plain.frequency, plain.density[:2], *band))
-    for kind, x, values, low, high in kinds:
-        for joint in range(2):
-            yield {
-                "quantity": [kind] * x.size,
-                "joint": np.full(x.size, joint + 1, dtype=np.int32),
-                "x": x,
-                "value": values[joint],
-                "low": low[joint],
-                "high": high[joint],
-            }
+        plain, none = spectra(sums), np.array(np.nan)
+        kinds = [
+            (SPECTRUM, plain.frequency, plain.density[:2], none, none),
+            (TORQUE_SPECTRUM, plain.frequency, plain.density[2:], none, none),
+        ]
+    for kind, x, values, low, high in (
+        *kinds,
+        (AUTOCORRELATION, r.lag, r.correlation, -r.half, r.half),
+    ):
+        yield {
+            "quantity": [kind] * values.size,
+            "joint": np.repeat(np.arange(1, 3, dtype=np.int32), x.size),
+            "x": np.tile(x, 2),
+            "value": values.ravel(),
+            "low": np.broadcast_to(low, values.shape).ravel(),
+            "high": np.broadcast_to(high, values.shape).ravel(),
+        }
 
 
 def residual_of(found: Fitted) -> ResidualSums | None:
@@ -214,12 +208,10 @@ def residual_of(found: Fitted) -> ResidualSums | None:
     if fit.delay is not None:
         problem = problem.at(found.chosen.model, fit.delay)
     sums, known = [], predictor_of_fit(found)
-    for loaded, sources in problem.kinds():
-        c = known.coefficients("loaded" if loaded else "unloaded")
-        for source in sources:
-            of_log = weak.residuals(source, problem.settings, c)
-            if of_log is not None:
-                sums.append(of_log)
+    for log, source in zip(found.survey.logs, problem.logs, strict=True):
+        of_log = weak.residuals(source, problem.settings, known.coefficients(log.role))
+        if of_log is not None:
+            sums.append(of_log)
     return pooled(sums)
 
 
@@ -231,11 +223,8 @@ def write_fit_series(folder: Path, found: Fitted, residual: ResidualSums | None)
     bounds or did not converge) and, where there is a residual, `innovations.parquet`.
     """
     fit, survey = found.fit, found.survey
-    starts, durations = [], []
-    for log in survey.logs:
-        summary = survey.summary(log)
-        starts.append(summary.start_ns)
-        durations.append(summary.duration)
+    starts = [survey.whole(log).first_ns for log in survey.logs]
+    durations = [log.duration for log in survey.logs]
     known = predictor_of_fit(found)
     write_columns(folder / "torque.parquet", torque_blocks(survey, known), starts)
     write_columns(folder / "scored.parquet", scored_blocks(survey, known), starts)

@@ -37,18 +37,14 @@ def prediction(score: PredictionScore) -> TorquePrediction | None:
     """As the result holds it; None where every log was too short to judge."""
     if score.count == 0:
         return None
-    rmse, nrmse, r2, of_load, *by_state = (
-        (float(one[0]), float(one[1]))
-        for one in (score.rmse, score.nrmse, score.r2, score.of_load, *score.by_state)
-    )
-    moving, rest, held = ((finite(one), finite(other)) for one, other in by_state)
+    moving, rest, held = ((finite(one), finite(other)) for one, other in score.by_state.tolist())
     return TorquePrediction(
-        rmse=rmse,
-        nrmse=nrmse,
-        r2=r2,
+        rmse=score.rmse.tolist(),
+        nrmse=score.nrmse.tolist(),
+        r2=score.r2.tolist(),
         filter=FILTER,
         bandwidth=CUTOFF,
-        of_load=of_load,
+        of_load=score.of_load.tolist(),
         rmse_moving=moving,
         rmse_rest=rest,
         rmse_held=held,
@@ -172,8 +168,8 @@ def validate(known: Predictor, survey: Recordings, *, simulate: bool = False) ->
     if simulate:
         simulated[EVERY] = sum(simulated.values(), RolloutScore())
     simulation = {}
-    for name, score_of in simulated.items():
-        columns = (HORIZONS, score_of.count, score_of.rmse, score_of.distance)
+    for name, own in simulated.items():
+        columns = zip(HORIZONS, own.count, own.rmse, own.distance, strict=True)
         simulation[name] = [
             {
                 "horizon": horizon,
@@ -181,7 +177,7 @@ def validate(known: Predictor, survey: Recordings, *, simulate: bool = False) ->
                 "rmse": list(map(finite, rmse)),
                 "moved": list(map(finite, moved)),
             }
-            for horizon, starts, rmse, moved in zip(*columns, strict=True)
+            for horizon, starts, rmse, moved in columns
         ]
     return Validated(predictions, prediction(total), simulation)
 
