@@ -79,6 +79,11 @@ def named_values(names: Iterable[str], values: FloatArray) -> dict[str, float]:
     return dict(zip(names, values.tolist(), strict=True))
 
 
+def given(**values: float | None) -> dict[str, float]:
+    """Those of the values that are given, by name."""
+    return {name: value for name, value in values.items() if value is not None}
+
+
 def rows_of(
     block: Mapping[str, NDArray[Any]], rows: slice | NDArray[Any]
 ) -> dict[str, NDArray[Any]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from algid.arm import CONSTANT_NAMES, Arm, FloatArray
 from algid.base.errors import ResultError, SettingError
-from algid.base.names import named_values, outside, vector
+from algid.base.names import given, named_values, outside, vector
 from algid.base.significance import SURE
 from algid.designs.belief import Belief
 from algid.estimators.noise import first_guess
@@ -72,16 +72,15 @@ class PriorKnowledge:
     @property
     def lengths(self) -> dict[str, float]:
         """The link lengths that are given, in m."""
-        lengths = {"l1": self.l1, "l2": self.l2}
-        return {name: length for name, length in lengths.items() if length is not None}
+        return given(l1=self.l1, l2=self.l2)
 
 
-def prior_of(given: Result | str, loaded: bool | None, knowns: PriorKnowledge) -> PriorArm:
+def prior_of(stated: Result | str, loaded: bool | None, knowns: PriorKnowledge) -> PriorArm:
     """The prior that is given.
 
     Parameters
     ----------
-    given : Result or str
+    stated : Result or str
         A result, its folder or file, the name of a shipped case, or a TOML file of an arm.
     loaded : bool or None
         Whether there are to be runs with the payload; None where there are if a payload is known.
@@ -95,13 +94,13 @@ def prior_of(given: Result | str, loaded: bool | None, knowns: PriorKnowledge) -
         If no arm has such an inertia matrix, or a payload is to be carried of which nothing is
         known.
     """
-    source = given.log.path if isinstance(given, Result) else given
-    if isinstance(given, str) and (Path(given).is_dir() or Path(given).suffix == ".json"):
-        given = read_result(given)
-    if isinstance(given, Result):
-        prior = _of_result(given, source, loaded, knowns)
+    source = stated.log.path if isinstance(stated, Result) else stated
+    if isinstance(stated, str) and (Path(stated).is_dir() or Path(stated).suffix == ".json"):
+        stated = read_result(stated)
+    if isinstance(stated, Result):
+        prior = _of_result(stated, source, loaded, knowns)
     else:
-        prior = of_case(load_case(given), source, loaded, knowns)
+        prior = of_case(load_case(stated), source, loaded, knowns)
     value = named_values(prior.belief.shared.names, prior.belief.mean)
     wrong = wrong_inertia(value)
     if wrong is not None:
@@ -246,12 +245,12 @@ def noise_for(
     if log is not None:
         measured = first_guess(log.theta, log.tau)
     levels = {}
-    for option, given, name in (
+    for option, level, name in (
         ("position_noise", position, "theta"),
         ("torque_noise", torque, "tau"),
     ):
-        if given is not None:
-            levels[name] = np.full(2, given)
+        if level is not None:
+            levels[name] = np.full(2, level)
         elif measured is not None and np.all(getattr(measured, name) > 0):
             levels[name] = getattr(measured, name)
         else:

@@ -25,6 +25,7 @@ from algid.arm import FloatArray
 from algid.base.criteria import HOLE
 from algid.base.errors import LogError
 from algid.base.files import read_whole
+from algid.base.names import given
 from algid.base.runtime import one_blas_thread
 from algid.estimators.problem import TooShortError
 from algid.identification.known import as_logged, contradictions, read_otherwise, reused
@@ -88,8 +89,8 @@ def track_log(
     first = next(survey.segments(source), None)
     if first is None:
         raise LogError(f"{source.name}: it holds no samples; record longer")
-    given = {name: one for name, one in zip(LENGTHS, (l1, l2), strict=True) if one is not None}
-    arm, covariance = arm_of(as_logged(result, profile), first, **given)
+    lengths = given(l1=l1, l2=l2)
+    arm, covariance = arm_of(as_logged(result, profile), first, **lengths)
     try:
         with one_blas_thread():
             weighed = track(partial(survey.segments, source), arm, covariance)
@@ -101,7 +102,7 @@ def track_log(
     if judged.grade != "good":
         numbers = {"grade": judged.word.lower(), "headline": judged.headline}
         notices.append(Notice("ARM_DOUBTFUL", numbers=numbers))
-    notices += contradictions(result, given)
+    notices += contradictions(result, lengths)
     notices += read_otherwise([survey.summary(source)], result, called)
     notices += merged(of_log)
     schedule = None
