@@ -19,8 +19,8 @@ with β′ the change of the best parameters with x.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import reduce
+from dataclasses import dataclass, replace
+from functools import cache, reduce
 from operator import add
 from typing import Literal
 
@@ -86,9 +86,8 @@ def fit(problem: Problem) -> Fit:
     TooShortError
         If there is no log, or no log long enough.
     """
-    start, prior, progress = weak_fit(problem), problem.prior, problem.progress
-    shared, anchored = start.shared, _anchored(start)
-    logs = opened(problem)
+    start, prior = weak_fit(problem), problem.prior
+    logs, anchored = opened(problem), _anchored(start)
     turn, dt = max((largest_turn(log.kept), log.kept[0].dt) for log in logs)
     if turn > FAR:
         numbers = {"case": "turn", "kept": start.estimator, "turn": turn, "rate": turn / FAR / dt}
@@ -100,53 +99,46 @@ def fit(problem: Problem) -> Fit:
         return replace(start.noted(Notice("REFUTED", numbers=numbers)), iterations=iterations)
 
     try:
-        beta, outcomes, iterations, end = _train(shared, logs, start.values, anchored, progress)
-        of_width: FloatArray = np.zeros(())
-        if any(_SHAPE in TERMS[term].shapes for term in shared.model.terms):
-            shared, beta, outcomes, end, of_width = _settled_width(
-                shared, logs, (beta, outcomes, end), anchored, progress
-            )
-        if end == "refuted":
+        trained = _train(start.shared, logs, start.values, anchored, problem.progress)
+        iterations, of_width = trained.steps, np.zeros_like(start.covariance)
+        if any(_SHAPE in TERMS[term].shapes for term in start.shared.model.terms):
+            trained, of_width = _settled_width(trained, logs, anchored, problem.progress)
+        if trained.end == "refuted":
             return given_up("noise")
-        settled = end == "settled" and bool(np.all(np.isfinite(beta)))
-        if settled and not all(log.whole for log in logs):
-            beta, outcomes = _finish(shared, logs, beta, anchored)
-    except np.linalg.LinAlgError:
-        settled, iterations = False, 0
-    if not settled:
-        return given_up("not converged")
-    whiteness = judge(reduce(add, [outcome.residual for outcome in outcomes]))
-    informations = [outcome.information for outcome in outcomes]
-    samples = int(_count(outcomes))
-    coloured = not whiteness.white
-    fitted = finish(
-        "refined",
-        shared,
-        informations,
-        beta,
-        start.moved,
-        prior,
-        coloured=coloured,
-        samples=samples,
-        repeats=_repeats(logs),
-    )
-    tested, at = evenly_spread(logs, _MOST_TESTED), {}
-    for log in tested:
-        log.smooth, log.by_motion = True, not acting(shared.model, "elastic")
-        c = shared.coefficients(fitted.values, log.loaded)
-        at[log.loaded] = named_values(shared.log_names, c)
-    try:
-        products = Products(tested, shared.model, at, problem.settings.shift.delay, shapes)
+        if trained.end == "unsettled" or not np.all(np.isfinite(trained.beta)):
+            return given_up("not converged")
+        if not all(log.whole for log in logs):
+            trained = _finish(trained, logs, anchored)
+        residual = tuple(outcome.residual for outcome in trained.outcomes)
+        whiteness = judge(reduce(add, residual))
+        fitted = finish(
+            "refined",
+            trained.shared,
+            [outcome.information for outcome in trained.outcomes],
+            trained.beta,
+            start.moved,
+            prior,
+            coloured=not whiteness.white,
+            samples=int(_count(trained.outcomes)),
+            repeats=_repeats(logs),
+        )
+        tested, at = evenly_spread(logs, _MOST_TESTED), {}
+        for log in tested:
+            log.smooth, log.by_motion = True, not acting(fitted.shared.model, "elastic")
+            c = fitted.shared.coefficients(fitted.values, log.loaded)
+            at[log.loaded] = named_values(fitted.shared.log_names, c)
+        delay = problem.settings.shift.delay
+        products = Products(tested, fitted.shared.model, at, delay, shapes)
         p_value = misfit(tested, (log.noise.tau for log in tested), fitted, products)
-    except np.linalg.LinAlgError:  # of joints that never move
+    except np.linalg.LinAlgError:  # also of joints that never move
         return given_up("not converged")
     if p_value < level("REFUTED"):
         return replace(given_up("motion", p_value=p_value), products=products)
     # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.
-    status = list(fitted.status)
-    for place, before in enumerate(start.status):
-        if before != "OK":
-            status[place] = before
+    status = [
+        own if before == "OK" else before
+        for own, before in zip(fitted.status, start.status, strict=True)
+    ]
     return with_body(
         replace(
             fitted,
@@ -155,7 +147,7 @@ def fit(problem: Problem) -> Fit:
             unidentifiable=tuple(dict.fromkeys(fitted.unidentifiable + start.unidentifiable)),
             noise=tuple(log.noise for log in logs),
             whiteness=whiteness,
-            residual=tuple(outcome.residual for outcome in outcomes),
+            residual=residual,
             iterations=iterations,
             products=products,
         )
@@ -175,18 +167,19 @@ def _anchored(start: Fit) -> Prior | None:
 
     There the trajectories and the parameters would chase each other for ever, in nothing but noise.
     """
-    _, S, _ = combine(start.shared, start.logs, start.values, start.prior)
-    null, size = open_directions(start.names, start.values, S)
+    prior, names = start.prior, start.names
+    _, S, _ = combine(start.shared, start.logs, start.values, prior)
+    null, size = open_directions(names, start.values, S)
     if null.shape[1] == 0:
-        return start.prior
+        return prior
     along = null.T @ (start.values / size)
     mean = start.values + size * (null @ (np.clip(along, -1, 1) - along))
     precision = (null @ null.T) / np.outer(size, size) / _ANCHOR**2
-    if start.prior is not None:
-        places = start.prior.places(start.names)
-        precision[np.ix_(places, places)] += start.prior.precision
-        mean[places] = start.prior.mean
-    return Prior(start.names, mean, precision)
+    if prior is not None:
+        places = prior.places(names)
+        precision[np.ix_(places, places)] += prior.precision
+        mean[places] = prior.mean
+    return Prior(names, mean, precision)
 
 
 FAR = 0.35
@@ -203,31 +196,45 @@ def largest_turn(pieces: Sequence[Segment]) -> float:
     return float(quantile(np.concatenate(turns), 1 - _SELDOM)) if turns else 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class _Trained:
+    """Parameters (Q,) of `shared`, the last pass over each log, the steps, and how they ended."""
+
+    shared: Shared
+    beta: FloatArray
+    outcomes: list[Outcome]
+    steps: int
+    end: End
+
+
 def _train(
     shared: Shared,
     logs: Sequence[LogEvidence],
     beta: FloatArray,
     prior: Prior | None,
     progress: Progress | None,
-) -> tuple[FloatArray, list[Outcome], int, End]:
-    """Parameters, the last pass over each log, steps taken, and how the alternation ended."""
+) -> _Trained:
+    """The alternation from the parameters `beta` on."""
     total = sum(log.trained for log in logs)
     many = len(logs) > _MOST_SCORED
     share, before = 1.0, np.zeros_like(beta)
-    for iteration in range(1, _STEPS + 1):
+    end: End | None = None
+    for steps in range(1, _STEPS + 1):
         outcomes: list[Outcome] = []
         done = 0
-        free = iteration <= _NOISE_STEPS
+        free = steps <= _NOISE_STEPS
         for log in logs:
             outcomes.append(log.train(shared, beta, free=free))
             done += log.trained
             if progress is not None:
-                progress(f"fitting, step {iteration}", done, total)
+                progress(f"fitting, step {steps}", done, total)
         better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, prior)
         step = better - beta
         earlier, moved = _distance(before, S), _distance(step, S)
-        driven = moved > _DRIVEN and _overshot(step, before, S)
-        if driven or iteration > _NOISE_STEPS:
+        # Accelerations of trajectories keep noise, which makes columns look more informed than
+        # they are: what only such columns tell apart is chased to and fro, and further back.
+        driven = moved > _DRIVEN and -float(step @ S @ before) > earlier**2 > 0
+        if driven or not free:
             for log in logs:
                 log.smooth = True
         if not free and 0 < earlier < moved:  # it steps to and fro
@@ -236,95 +243,83 @@ def _train(
         beta = beta + share * step
         if not np.all(np.isfinite(beta)):
             raise np.linalg.LinAlgError("the estimates run away")
-        if many and free and iteration > 1:
+        if many and free and steps > 1:
             for log, outcome in zip(logs, outcomes, strict=True):
                 log.sure = outcome.noise_change < _NOISE_SETTLED
-        improved = max(outcome.noise_change for outcome in outcomes)
-        levels = [log.noise.tau for log in logs]
+        if max(outcome.noise_change for outcome in outcomes) >= _NOISE_SETTLED:
+            continue
         # on the way to its level noise may be larger
-        if improved < _NOISE_SETTLED and misfit(logs, levels) < level("REFUTED"):
-            return beta, outcomes, iteration, "refuted"
-        settled = moved < SETTLED
-        if moved < earlier:
-            # Steps that shrink do so in the same ratio: what is left of the geometric series.
-            settled |= moved**2 / (earlier - moved) < _REST
-        if iteration > 1 and settled and improved < _NOISE_SETTLED:
-            return beta, outcomes, iteration, "settled"
+        if misfit(logs, [log.noise.tau for log in logs]) < level("REFUTED"):
+            end = "refuted"
+        # Steps that shrink do so in the same ratio: what is left of the geometric series.
+        elif steps > 1 and (
+            moved < SETTLED or (moved < earlier and moved**2 / (earlier - moved) < _REST)
+        ):
+            end = "settled"
+        if end:
+            return _Trained(shared, beta, outcomes, steps, end)
     # steps within what a torque's error that matters would leave, where there is next to none
-    if moved * min(1.0, max(log.relative_error for log in logs)) < _CLOSE:
-        return beta, outcomes, _STEPS, "settled"
-    return beta, outcomes, _STEPS, "unsettled"
-
-
-def _overshot(step: FloatArray, before: FloatArray, S: FloatArray) -> bool:
-    """Whether a step (Q,) goes back further than the one `before` went.
-
-    Accelerations of trajectories keep noise, which makes columns look more informed than they are:
-    parameters that only such columns tell apart are chased to and fro.
-    """
-    return -float(step @ S @ before) > float(before @ S @ before) > 0
+    close = moved * min(1.0, max(log.relative_error for log in logs)) < _CLOSE
+    return _Trained(shared, beta, outcomes, steps, "settled" if close else "unsettled")
 
 
 def _settled_width(
-    shared: Shared,
+    trained: _Trained,
     logs: Sequence[LogEvidence],
-    trained: tuple[FloatArray, list[Outcome], End],
     prior: Prior | None,
     progress: Progress | None,
-) -> tuple[Shared, FloatArray, list[Outcome], End, FloatArray]:
+) -> tuple[_Trained, FloatArray]:
     """What was `trained`, at the likeliest width of friction's step, and what that adds (Q, Q).
 
     The weak form sees friction through a differentiator whose noise blurs the step: what it takes
     for the width may be several times the true one. The likelihood may be refuted by that alone.
     """
-    beta, outcomes, end = trained
+
+    def of_width(width: float) -> Shared:
+        shared = trained.shared
+        return replace(shared, model=replace(shared.model, coulomb_speed=width))
 
     def profile(width: float) -> tuple[float, FloatArray]:
-        other = replace(shared, model=replace(shared.model, coulomb_speed=width))
+        other, beta = of_width(width), trained.beta
         try:
             seen = [log.held(other, beta) for log in logs]
         except np.linalg.LinAlgError:  # so narrow a step does not go with the trajectories
             return np.inf, beta
-        informations = [outcome.information for outcome in seen]
-        better, _, value = combine(other, informations, beta, prior)
+        better, _, value = combine(other, [outcome.information for outcome in seen], beta, prior)
         return sum(outcome.deviance for outcome in seen) - 2 * value, better
 
     for _ in range(_WIDTHS):
-        now = shared.model.coulomb_speed
+        now = trained.shared.model.coulomb_speed
         width, added = likeliest_width(profile, now)
         moved = abs(np.log(width / now))
-        if moved < _WIDTH_SETTLED or (end != "settled" and moved < _WIDTH_FAR):
+        if moved < _WIDTH_SETTLED or (trained.end != "settled" and moved < _WIDTH_FAR):
             break
-        before = shared, beta, outcomes
-        was_settled = end == "settled"
         states = [log.state for log in logs]
-        shared = replace(shared, model=replace(shared.model, coulomb_speed=width))
         for log in logs:
             log.forget_noise()
-        beta, outcomes, _, end = _train(shared, logs, beta, prior, progress)
-        if end == "unsettled" and was_settled:  # the step is too narrow for the motion
-            shared, beta, outcomes = before
-            for log, state in zip(logs, states, strict=True):
+        again = _train(of_width(width), logs, trained.beta, prior, progress)
+        if again.end == "unsettled" and trained.end == "settled":
+            for log, state in zip(logs, states, strict=True):  # too narrow a step for the motion
                 log.restore(state)
-            return shared, beta, outcomes, "settled", added
-        if end != "settled":
             break
-    return shared, beta, outcomes, end, added
+        trained = again
+        if trained.end != "settled":
+            break
+    return trained, added
 
 
-def _finish(
-    shared: Shared, logs: Sequence[LogEvidence], beta: FloatArray, prior: Prior | None
-) -> tuple[FloatArray, list[Outcome]]:
+def _finish(trained: _Trained, logs: Sequence[LogEvidence], prior: Prior | None) -> _Trained:
     """Passes over whole logs until the step is one that a single Gauss-Newton step can make."""
     for _ in range(_PASSES):
+        shared, beta = trained.shared, trained.beta
         outcomes = [log.run(shared, beta) for log in logs]
         better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, prior)
         share = sum(log.trained for log in logs)
         far = _distance(better - beta, S) * np.sqrt(share / max(share, _count(outcomes)))
-        beta = better
+        trained = replace(trained, beta=better, outcomes=outcomes)
         if far < _FAR * np.sqrt(beta.size):
             break
-    return beta, outcomes
+    return trained
 
 
 def _distance(step: FloatArray, S: FloatArray) -> float:
@@ -355,27 +350,27 @@ def likeliest_width(profile: Profile, start: float) -> tuple[float, FloatArray]:
     start : float, rad/s
     """
     low, high = np.log(NARROWEST), np.log(WIDEST)
-    first = float(np.clip(np.log(start), low, high))
-    seen: dict[int, tuple[float, FloatArray]] = {}  # by half octaves from the first width
+    first, h = float(np.clip(np.log(start), low, high)), _HALF_OCTAVE
+
+    @cache
+    def seen(place: int) -> tuple[float, FloatArray]:
+        """By half octaves from the first width."""
+        x = first + place * h
+        return profile(float(np.exp(x))) if low <= x <= high else (np.inf, np.empty(0))
 
     def deviance(place: int) -> float:
-        x = first + place * _HALF_OCTAVE
-        if not low <= x <= high:
-            return np.inf
-        if place not in seen:
-            seen[place] = profile(float(np.exp(x)))
-        return seen[place][0] if np.isfinite(seen[place][0]) else np.inf
+        value, _ = seen(place)
+        return value if np.isfinite(value) else np.inf
 
     place = 0
     for step in (2, 1):
         while deviance(best := min(place - step, place + step, key=deviance)) < deviance(place):
             place = best
-    x, h = first + place * _HALF_OCTAVE, _HALF_OCTAVE
-    below, here, above = (deviance(place + side) for side in (-1, 0, 1))
+    x, (below, here, above) = first + place * h, map(deviance, (place - 1, place, place + 1))
     if not np.isfinite([below, above]).all():
-        return float(np.exp(x)), np.zeros((seen[place][1].size,) * 2)
+        return float(np.exp(x)), np.zeros((seen(place)[1].size,) * 2)
     slope, curvature = (above - below) / (2 * h), max((below - 2 * here + above) / h**2, 1e-300)
-    change = (seen[place + 1][1] - seen[place - 1][1]) / (2 * h)
+    change = (seen(place + 1)[1] - seen(place - 1)[1]) / (2 * h)
     variance = min(2.0 / curvature, (high - low) ** 2 / 12)
     bottom = x + float(np.clip(-slope / curvature, -h, h))
     return float(np.exp(bottom)), variance * np.outer(change, change)
