@@ -32,6 +32,7 @@ from algid.model import (
     torque,
 )
 from algid.physics.signals import Values
+from algid.signals.filters import correlate
 
 _ROTOR = 0.5  # a motor's share of the inertia that its joint feels, before any log
 _ROUNDS = 6
@@ -139,27 +140,20 @@ def _rates(x: FloatArray, dt: float, seconds: float) -> FloatArray:
     samples = x.shape[1]
     if samples < 2 * reach + 1:
         return np.zeros((3, *x.shape))
-    to_rates = _windows(reach)
     rates = np.empty((3, *x.shape))
-    for order in range(3):
-        kernel = to_rates[order, reach] / dt**order
-        for joint in range(2):
-            rates[order, joint, reach : samples - reach] = np.correlate(x[joint], kernel)
-        ends = to_rates[order] / dt**order
-        rates[order, :, :reach] = x[:, : 2 * reach + 1] @ ends[:reach].T
-        rates[order, :, samples - reach :] = x[:, -2 * reach - 1 :] @ ends[reach + 1 :].T
+    for own, window in zip(rates, _windows(reach) / dt ** np.arange(3)[:, None, None], strict=True):
+        own[:, reach : samples - reach] = correlate(x, window[reach])
+        own[:, :reach] = x[:, : 2 * reach + 1] @ window[:reach].T
+        own[:, samples - reach :] = x[:, -2 * reach - 1 :] @ window[reach + 1 :].T
     return rates
 
 
 @lru_cache(maxsize=8)
 def _windows(reach: int) -> FloatArray:
     """What a window's samples count for in the rates (3, 2 reach + 1, 2 reach + 1) at each one."""
-    s = np.arange(-reach, reach + 1) / reach
-    powers = np.vander(s, _DEGREE + 1, increasing=True)
+    powers = np.vander(np.arange(-reach, reach + 1) / reach, _DEGREE + 1, increasing=True)
     to_powers = np.linalg.pinv(powers)
-    order = np.arange(_DEGREE + 1)
-    slope = np.zeros_like(powers)
-    slope[:, 1:] = powers[:, :-1] * order[1:] / reach
-    bend = np.zeros_like(powers)
-    bend[:, 2:] = powers[:, :-2] * order[2:] * order[1:-1] / reach**2
-    return np.stack([powers @ to_powers, slope @ to_powers, bend @ to_powers])
+    slope = np.diag(np.arange(1, _DEGREE + 1) / reach, 1)  # of a polynomial, by its coefficients
+    return np.stack(
+        [powers @ to_powers, powers @ slope @ to_powers, powers @ slope @ slope @ to_powers]
+    )

@@ -150,13 +150,10 @@ class Products:
         self.noisy = self.open_squares < self.samples
         keep_arrays(self)  # a fit hands it on
 
-    def _places(self, loaded: bool) -> NDArray[np.int64]:
+    def _places(self, loaded: bool) -> list[int]:
         """Where a log's coefficients and widths stand in p."""
-        places, apart = np.split(np.arange(self.size), [len(self.names)])
-        if loaded:
-            for place in apart:
-                places[self.names.index(self._labels[place])] = place
-        return places
+        last = {label: place for place, label in enumerate(self._labels)}
+        return [last[name] if loaded else place for place, name in enumerate(self.names)]
 
     def columns(self, terms: Iterable[str]) -> NDArray[np.int64]:
         """Places in p of eq. (1), of `terms` and of their widths."""
@@ -228,33 +225,31 @@ class Products:
         return np.abs(inverse @ self.total[rest, place]) / np.maximum(size, 1e-300)
 
 
-class _Joint(NamedTuple):
-    """A joint's torque, angle, velocity and its smooth sign (n,), and the other joint's motion."""
+class _Acting(NamedTuple):
+    """The joints' torques, angles, velocities, their smooth signs, and accelerations (2, n)."""
 
     T: FloatArray
     theta: FloatArray
     omega: FloatArray
     sign: FloatArray
-    other_sign: FloatArray
-    other_omega: FloatArray
-    other_alpha: FloatArray
+    alpha: FloatArray
 
 
-_SHAPES: tuple[tuple[str, Callable[[_Joint], FloatArray]], ...] = (
+_SHAPES: tuple[tuple[str, Callable[[_Acting], FloatArray]], ...] = (
     ("gears", lambda j: np.abs(j.T) * j.sign),
     ("saturation", lambda j: np.abs(j.T) * j.T),
     ("dead band", lambda j: np.sign(j.T)),
     ("drag", lambda j: np.abs(j.omega) * j.omega),
-    ("spring", lambda j: j.theta - j.theta.mean()),
+    ("spring", lambda j: j.theta - j.theta.mean(axis=1, keepdims=True)),
     ("once a turn", lambda j: np.sin(j.theta)),
     ("once a turn", lambda j: np.cos(j.theta)),
     ("twice a turn", lambda j: np.sin(2 * j.theta)),
     ("twice a turn", lambda j: np.cos(2 * j.theta)),
     ("friction along a turn", lambda j: np.sin(j.theta) * j.sign),
     ("friction along a turn", lambda j: np.cos(j.theta) * j.sign),
-    ("the other joint", lambda j: j.other_sign),
-    ("the other joint", lambda j: j.other_omega),
-    ("the other joint", lambda j: j.other_alpha),
+    ("the other joint", lambda j: j.sign[::-1]),
+    ("the other joint", lambda j: j.omega[::-1]),
+    ("the other joint", lambda j: j.alpha[::-1]),
 )
 """Torques of a joint in shapes that no term has, and what each belongs to."""
 _OWN = 1e-6
@@ -268,21 +263,17 @@ _ALIKE = 1e-5
 def shapes(model: Model, c: FloatArray, motion: Motion, dt: float) -> FloatArray:
     """What friction's widths change, and torques of one joint each in shapes that no term has."""
     own = of_no_term(model, _acting(model, c, motion), motion)
-    return np.stack([*widened(model, c, motion, dt), *own])
+    return np.concatenate([widened(model, c, motion, dt), own])
 
 
 def of_no_term(model: Model, acting: FloatArray, motion: Motion) -> list[FloatArray]:
     """Torques (2, n) of one joint each, in shapes that no term has, where (2, n) N m act."""
-    signs = [smooth_sign(model, omega) for omega in motion.omega]
-    made = []
-    for joint, other in ((0, 1), (1, 0)):
-        own = motion.theta[joint], motion.omega[joint], signs[joint]
-        seen = _Joint(acting[joint], *own, signs[other], motion.omega[other], motion.alpha[other])
-        for _, shape in _SHAPES:
-            row = np.zeros_like(acting)
-            row[joint] = shape(seen)
-            made.append(row)
-    return made
+    sign = smooth_sign(model, motion.omega)
+    seen = _Acting(acting, motion.theta, motion.omega, sign, motion.alpha)
+    made = np.zeros((2, len(_SHAPES), *acting.shape))
+    for place, (_, shape) in enumerate(_SHAPES):
+        made[[0, 1], place, [0, 1]] = shape(seen)
+    return list(made.reshape(-1, *acting.shape))
 
 
 def _acting(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
@@ -321,12 +312,15 @@ def misfit(
         return 0.0
     if fit is None or products is None:
         return 1.0
-    shared, names, kinds = fit.shared, products.names, 2 * [kind for kind, _ in _SHAPES]
+    shared, names = fit.shared, products.names
     present = [names.index(name) for name in shared.log_names]
     absent = places_outside(names, [*shared.log_names, *WIDTHS])
     # friction's widths are estimated beside the parameters
     free = [names.index(name) for name in WIDTHS]
-    rest = [*free, -1, *absent, *range(len(names), len(names) + len(kinds))]
+    kinds = np.array(
+        [TERM_OF[names[place]] for place in absent] + 2 * [kind for kind, _ in _SHAPES]
+    )
+    rest = [*free, -1, *absent, *range(len(names), len(names) + 2 * len(_SHAPES))]
     Q, whole = len(fit.names), np.zeros(())
     for loaded, gram in products.each:
         by_shared = np.zeros((len(gram), Q + len(rest)))
@@ -340,19 +334,13 @@ def misfit(
         S[np.ix_(known, known)] += fit.prior.precision
     D = scaled_pinv(S) @ X  # what the parameters take up
     M, b = G - X.T @ D, whole[P + 1 :, P] - D.T @ whole[:P, P]
-    kinds = [TERM_OF[names[place]] for place in absent] + kinds
     beside = np.diag(M) > _OWN * np.diag(G)
-    freedom, statistic = _score(M, b, np.flatnonzero(beside))
-    places: dict[str, list[int]] = {}
-    for place, kind in enumerate(kinds):
-        if beside[place]:
-            places.setdefault(kind, []).append(place)
-    alone = [1.0]
-    for own in places.values():
-        rank, wald = _score(M, b, np.array(own))
-        alone.append(float(chi2_tail(rank, wald)))
-    together = float(chi2_tail(max(freedom, 1), statistic))
-    return min(1.0, 2 * together, 2 * len(places) * min(alone))
+    p_values = []
+    for own in (beside, *(beside & (kinds == kind) for kind in dict.fromkeys(kinds[beside]))):
+        rank, statistic = _score(M, b, np.flatnonzero(own))
+        p_values.append(float(chi2_tail(max(rank, 1), statistic)))
+    together, *alone = p_values
+    return min(1.0, 2 * together, 2 * len(alone) * min(alone, default=1.0))
 
 
 def _score(M: FloatArray, b: FloatArray, own: NDArray[np.int64]) -> tuple[int, float]:

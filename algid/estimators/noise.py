@@ -39,6 +39,8 @@ from algid.estimators.whitening import (
 )
 
 _DIFFERENCE = 6  # order of the difference that leaves only noise of a smooth signal
+_GAIN, _NEXT = np.sqrt([comb(12, 6), comb(14, 7)])
+"""What that difference and the next one make of white noise's deviation."""
 _FED_BACK = 0.9
 """Of the torque's white level: a controller makes more than that of its encoders' noise."""
 _LAGS = 32  # samples that a controller's torque rests on
@@ -86,9 +88,14 @@ def first_guess(theta: FloatArray, tau: FloatArray) -> NoiseLevels:
     """
     rms = np.sqrt(np.mean(tau**2, axis=1))
     least = np.where(rms > 0, 0.0, _MOTORLESS * rms.max())
-    levels, own = _white_noise(tau), _white_noise(tau, _not_fed_back(theta, tau))
+    levels, own = _white_noise(tau, _rough(tau)), _white_noise(tau, _not_fed_back(theta, tau))
     levels = np.where(own < _FED_BACK * levels, own, levels)
-    return NoiseLevels(_white_noise(theta), np.maximum(levels, least))
+    return NoiseLevels(_white_noise(theta, _rough(theta)), np.maximum(levels, least))
+
+
+def _rough(signal: FloatArray) -> FloatArray:
+    """Differences (..., n) that leave only noise of a smooth signal (..., N)."""
+    return np.diff(signal, _DIFFERENCE)
 
 
 def roughness(tau: FloatArray) -> FloatArray:
@@ -97,8 +104,7 @@ def roughness(tau: FloatArray) -> FloatArray:
     It is a root mean square: unlike `first_guess` it counts the jumps of the torque between two
     samples that dry friction makes. A motion leaves nothing in it, however slow its error.
     """
-    squares = np.mean(np.diff(tau, _DIFFERENCE, axis=1) ** 2, axis=1)
-    return np.asarray(np.sqrt(squares / comb(2 * _DIFFERENCE, _DIFFERENCE)))
+    return np.asarray(np.sqrt(np.mean(_rough(tau) ** 2, axis=1)) / _GAIN)
 
 
 def _not_fed_back(theta: FloatArray, tau: FloatArray) -> FloatArray:
@@ -108,39 +114,32 @@ def _not_fed_back(theta: FloatArray, tau: FloatArray) -> FloatArray:
     few, or not all noise. A controller turns the noise of its encoders into torque, which moves the
     arm and is no noise of the torque.
     """
-    angles = np.diff(theta[:, :_MOST_SAMPLES], _DIFFERENCE, axis=1)
-    torques = np.diff(tau[:, :_MOST_SAMPLES], _DIFFERENCE, axis=1)
+    angles, torques = _rough(theta[:, :_MOST_SAMPLES]), _rough(tau[:, :_MOST_SAMPLES])
     n = angles.shape[1] - _LAGS
-    if n < _FEWEST_SAMPLES or not _is_noise(theta[:, :_MOST_SAMPLES]):
-        return np.diff(tau, _DIFFERENCE, axis=1)
+    if n < _FEWEST_SAMPLES or not _is_noise(angles):
+        return _rough(tau)
     X = np.concatenate([angles[:, _LAGS - lag : _LAGS - lag + n] for lag in range(_LAGS)])
     size = np.sqrt(np.sum(X**2, axis=1)) + 1e-300
-    X = X / size[:, None]
-    own = torques[:, _LAGS:]
+    X, own = X / size[:, None], torques[:, _LAGS:]
     law = np.linalg.solve(X @ X.T + _RIDGE * np.eye(len(X)), X @ own.T)
     return np.asarray(own - law.T @ X)
 
 
-def _is_noise(signal: FloatArray) -> bool:
+def _is_noise(difference: FloatArray) -> bool:
     """Whether each row's next difference grows as white noise's does: no motion is left in it."""
-    difference = np.diff(signal, _DIFFERENCE, axis=1)
-    first = medians(np.abs(difference))
-    second = medians(np.abs(np.diff(difference, axis=1)))
-    order = _DIFFERENCE
-    growth = np.sqrt(comb(2 * order + 2, order + 1) / comb(2 * order, order))
-    return bool(np.all(np.abs(second - growth * first) < 0.1 * growth * first))
+    first = medians(np.abs(difference)) * _NEXT / _GAIN
+    second = medians(np.abs(np.diff(difference)))
+    return bool(np.all(np.abs(second - first) < 0.1 * first))
 
 
-def _white_noise(signal: FloatArray, difference: FloatArray | None = None) -> FloatArray:
-    """White noise (2,) behind a signal (2, N), by its sixth differences or those given."""
-    if difference is None:
-        difference = np.diff(signal, _DIFFERENCE, axis=1)
+def _white_noise(signal: FloatArray, difference: FloatArray) -> FloatArray:
+    """White noise (2,) behind a signal (2, N), by its differences (2, n)."""
     # The median of squares, so that steps in the signal do not count as noise.
     median = medians(np.abs(difference)) / 0.6745
     mean = np.sqrt(np.mean(difference**2, axis=1))
     spread = np.where(median > 0, median, mean)
     size = np.abs(signal).max(axis=1) + 1e-300
-    return np.maximum(spread / np.sqrt(comb(2 * _DIFFERENCE, _DIFFERENCE)), _SMALLEST * size)
+    return np.maximum(spread / _GAIN, _SMALLEST * size)
 
 
 def quantum(signal: FloatArray) -> FloatArray:

@@ -157,13 +157,16 @@ def linearise(
         raise np.linalg.LinAlgError(f"no torque acts within the angles, {stencil.shift} s later")
     measured = stencil.moving(piece.tau)[:, torques]
     acting = None if by_motion else measured
-    motion = flexed(model, c, Motion(*stencil.differences(theta0)), stencil.dt, acting)
-    J, torques_of_model = modelled(model, c, motion, stencil.dt)
+
+    def at(theta: FloatArray) -> tuple[Motion, FloatArray, FloatArray]:
+        motion = flexed(model, c, Motion(*stencil.differences(theta)), stencil.dt, acting)
+        return motion, *modelled(model, c, motion, stencil.dt)
+
+    motion, J, torques_of_model = at(theta0)
     G = along_stencil(partials(model, c, motion), stencil.weights)
     rising = torques_of_model
     if smooth is not None:
-        motion = flexed(model, c, Motion(*stencil.differences(smooth)), stencil.dt, acting)
-        J, rising = modelled(model, c, motion, stencil.dt)
+        motion, J, rising = at(smooth)
     error = measured - torques_of_model - forward(G, piece.theta - theta0, first)
     parts = []
     if not residual_only:
