@@ -25,8 +25,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from algid.arm import FloatArray, keep_arrays
 from algid.base.compiled import chi2_exceeded, chi2_tail
@@ -95,24 +97,13 @@ def residual_sums(w: FloatArray, dt: float, stride: int = 1, lags: int = LAGS) -
     far = _NEIGHBOURS[1] * np.maximum(lines - 2, 0.0)
     scatter = lines + 2 * (near + far)
     pairs = np.maximum(n - np.arange(lags + 1, dtype=np.float64), 0.0)
-    counts, products = [], []
-    for scale in SCALES:
-        whole = n // scale
+    counts, products = n // np.array(SCALES), []
+    for scale, whole in zip(SCALES, counts.tolist(), strict=True):
         x = w[:2, : whole * scale].reshape(2, whole, scale).sum(axis=2) / np.sqrt(scale)
-        counts.append(float(whole))
-        products.append(
-            [[row[lag:] @ row[: max(0, row.size - lag)] for lag in range(lags + 1)] for row in x]
-        )
-    return ResidualSums(
-        dt,
-        stride,
-        power.astype(np.float64),
-        lines,
-        scatter,
-        np.array(products),
-        pairs,
-        np.array(counts),
-    )
+        later = sliding_window_view(np.pad(x, [(0, 0), (0, lags)]), whole, axis=1)
+        products.append(np.einsum("jn,jln->jl", x, later))
+    sums = power.astype(np.float64), lines, scatter, np.array(products), pairs
+    return ResidualSums(dt, stride, *sums, counts.astype(np.float64))
 
 
 def pooled(sums: Sequence[ResidualSums]) -> ResidualSums | None:
@@ -129,8 +120,7 @@ def pooled(sums: Sequence[ResidualSums]) -> ResidualSums | None:
     return total
 
 
-@dataclass(frozen=True, eq=False)
-class Spectra:
+class Spectra(NamedTuple):
     """Densities (s, F) at frequencies (F,) in Hz, and factors (F,) that hold 95 % of white noise's.
 
     Densities are in u²/Hz, one-sided.
@@ -167,8 +157,7 @@ def spectra(sums: ResidualSums) -> Spectra:
     return Spectra(middle / sums.dt, 2 * sums.dt * density, low, high)
 
 
-@dataclass(frozen=True, eq=False)
-class Autocorrelation:
+class Autocorrelation(NamedTuple):
     """Correlations (2, L) at lags (L,) in s, and half widths (2, L) of white noise's 95 % bands."""
 
     lag: FloatArray
@@ -199,16 +188,12 @@ def whiteness_of(sums: ResidualSums) -> Spectra:
     return Spectra(raw.frequency, share, raw.low, raw.high)
 
 
-@dataclass(frozen=True, eq=False)
-class Whiteness:
+class Whiteness(NamedTuple):
     """The test's outcome by joint (2,): p-value, lag-one correlation, and the verdict."""
 
     p_value: FloatArray
     lag1: FloatArray
-    joint_white: tuple[bool, bool]
-
-    def __post_init__(self) -> None:
-        keep_arrays(self)
+    joint_white: tuple[bool, ...]
 
     @property
     def white(self) -> bool:
@@ -244,5 +229,5 @@ def judge(sums: ResidualSums) -> Whiteness:
     # In a long log the least colour is significant; one this faint does not move an error bar.
     faint = np.sqrt(np.mean(rho**2, axis=2)) < _FAINT
     p_value = np.minimum(1.0, len(SCALES) * np.where(faint, 1.0, p).min(axis=0))
-    first, second = (p_value >= 0.5 * level("whiteness")).tolist()
-    return Whiteness(p_value, rho[0, :, 0], (first, second))
+    white = (p_value >= 0.5 * level("whiteness")).tolist()
+    return Whiteness(p_value, rho[0, :, 0], tuple(white))

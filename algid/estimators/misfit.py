@@ -70,14 +70,12 @@ _STEP = 1e-3
 
 def widened(model: Model, c: FloatArray, motion: Motion, _dt: float) -> FloatArray:
     """Derivatives (widths, 2, n) of the torque by the logarithms of friction's widths, in N m."""
-    rows = []
-    for width in WIDTHS:
-        sides = []
-        for step in (_STEP, -_STEP):
-            other = replace(model, **{width: getattr(model, width) * (1 + step)})
-            sides.append(torque(other, c, motion))
-        rows.append((sides[0] - sides[1]) / (2 * _STEP))
-    return np.stack(rows)
+
+    def at(width: str, step: float) -> FloatArray:
+        value = getattr(model, width) * (1 + step)
+        return torque(replace(model, **{width: value}), c, motion)
+
+    return np.stack([(at(one, _STEP) - at(one, -_STEP)) / (2 * _STEP) for one in WIDTHS])
 
 
 At = Mapping[bool, Mapping[str, float]]

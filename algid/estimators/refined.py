@@ -111,6 +111,10 @@ def fit(problem: Problem) -> Fit:
             trained = _finish(trained, logs, anchored)
         residual = tuple(outcome.residual for outcome in trained.outcomes)
         whiteness = judge(reduce(add, residual))
+        repeats: Groups = ()
+        if len(logs) <= _MOST_COMPARED:
+            kinds = ([log.training for log in logs if log.loaded is kind] for kind in (False, True))
+            repeats = grouped(*kinds)
         fitted = finish(
             "refined",
             trained.shared,
@@ -120,7 +124,7 @@ def fit(problem: Problem) -> Fit:
             prior,
             coloured=not whiteness.white,
             samples=int(_count(trained.outcomes)),
-            repeats=_repeats(logs),
+            repeats=repeats,
         )
         tested, at = evenly_spread(logs, _MOST_TESTED), {}
         for log in tested:
@@ -154,14 +158,6 @@ def fit(problem: Problem) -> Fit:
     )
 
 
-def _repeats(logs: Sequence[LogEvidence]) -> Groups:
-    """Logs that repeat each other, by their training sets; none are looked for among many."""
-    if len(logs) > _MOST_COMPARED:
-        return ()
-    unloaded = [log.training for log in logs if not log.loaded]
-    return grouped(unloaded, [log.training for log in logs if log.loaded])
-
-
 def _anchored(start: Fit) -> Prior | None:
     """The prior, and an anchor on every direction that the weak estimate leaves open.
 
@@ -172,8 +168,7 @@ def _anchored(start: Fit) -> Prior | None:
     null, size = open_directions(names, start.values, S)
     if null.shape[1] == 0:
         return prior
-    along = null.T @ (start.values / size)
-    mean = start.values + size * (null @ (np.clip(along, -1, 1) - along))
+    mean = start.values.copy()
     precision = (null @ null.T) / np.outer(size, size) / _ANCHOR**2
     if prior is not None:
         places = prior.places(names)
@@ -217,7 +212,7 @@ def _train(
     """The alternation from the parameters `beta` on."""
     total = sum(log.trained for log in logs)
     many = len(logs) > _MOST_SCORED
-    share, before = 1.0, np.zeros_like(beta)
+    before = np.zeros_like(beta)
     end: End | None = None
     for steps in range(1, _STEPS + 1):
         outcomes: list[Outcome] = []
@@ -237,10 +232,7 @@ def _train(
         if driven or not free:
             for log in logs:
                 log.smooth = True
-        if not free and 0 < earlier < moved:  # it steps to and fro
-            share *= 0.5
-        before = step
-        beta = beta + share * step
+        before, beta = step, better
         if not np.all(np.isfinite(beta)):
             raise np.linalg.LinAlgError("the estimates run away")
         if many and free and steps > 1:
@@ -366,11 +358,19 @@ def likeliest_width(profile: Profile, start: float) -> tuple[float, FloatArray]:
     for step in (2, 1):
         while deviance(best := min(place - step, place + step, key=deviance)) < deviance(place):
             place = best
-    x, (below, here, above) = first + place * h, map(deviance, (place - 1, place, place + 1))
-    if not np.isfinite([below, above]).all():
+    x, around = first + place * h, [deviance(place + side) for side in (-1, 0, 1)]
+    if not np.all(np.isfinite(around)):
         return float(np.exp(x)), np.zeros((seen(place)[1].size,) * 2)
-    slope, curvature = (above - below) / (2 * h), max((below - 2 * here + above) / h**2, 1e-300)
+    offset, curvature = parabola(*around)
     change = (seen(place + 1)[1] - seen(place - 1)[1]) / (2 * h)
-    variance = min(2.0 / curvature, (high - low) ** 2 / 12)
-    bottom = x + float(np.clip(-slope / curvature, -h, h))
-    return float(np.exp(bottom)), variance * np.outer(change, change)
+    variance = min(2.0 * h**2 / curvature, (high - low) ** 2 / 12)
+    return float(np.exp(x + h * offset)), variance * np.outer(change, change)
+
+
+def parabola(below: float, here: float, above: float) -> tuple[float, float]:
+    """The bottom of a parabola through three values a step apart, in steps from the middle one.
+
+    No further than a step; and its curvature.
+    """
+    curvature = max(below - 2 * here + above, 1e-300)
+    return float(np.clip(0.5 * (below - above) / curvature, -1, 1)), curvature

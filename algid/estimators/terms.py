@@ -34,7 +34,6 @@ from typing import Literal
 
 import numpy as np
 
-from algid.arm import FloatArray
 from algid.base.compiled import chi2_exceeded
 from algid.base.names import evenly_spread, outside, vector, within
 from algid.base.significance import level
@@ -44,6 +43,7 @@ from algid.estimators.log_likelihood import opened
 from algid.estimators.misfit import At, Products, misfit
 from algid.estimators.modulating_functions import Known, row_weights
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
+from algid.estimators.refined import parabola
 from algid.model import (
     CHOICES,
     DELAYS,
@@ -210,22 +210,13 @@ def _start(
         for value in values:
             trial = replace(model, **{shape: value})  # type: ignore[arg-type]
             costs.append(solved(replace(trial, terms=terms))[0])
-        best = float(np.exp(_lowest(np.log(values), costs)))
+        least, offset = int(np.argmin(costs)), 0.0
+        if 0 < least < len(costs) - 1:
+            offset, _ = parabola(*costs[least - 1 : least + 2])
+        best = float(values[least] * (values[1] / values[0]) ** offset)
         model = replace(model, **{shape: best})  # type: ignore[arg-type]
     model = replace(model, terms=firsts)
     return model, solved(model)[1]
-
-
-def _lowest(x: FloatArray, y: Sequence[float]) -> float:
-    """Where the parabola through the least value and its neighbours has its bottom.
-
-    At an end, the end itself.
-    """
-    least = int(np.argmin(y))
-    if least in (0, len(x) - 1):
-        return float(x[least])
-    a, b, _ = np.polyfit(x[least - 1 : least + 2] - x[least], y[least - 1 : least + 2], 2)
-    return float(x[least] - b / (2 * a))
 
 
 @dataclass(frozen=True, eq=False)
@@ -468,10 +459,8 @@ def _selected(
     lateness = first.lateness(terms)
     if refuted:  # of what a model that does not hold leaves, no part is the delay's
         lateness = replace(lateness, std=np.inf)
-    chosen = Selection(shapes, False, shapes=shapes, refuted=refuted, late=lateness)
+    chosen = Selection(shapes, False, "logs", shapes=shapes, refuted=refuted, late=lateness)
     chosen = search.into(chosen, terms)
-    if candidates:
-        chosen = replace(chosen, chosen_by="logs")
-    else:
-        chosen = replace(chosen, trials=())
+    if not candidates:
+        chosen = replace(chosen, chosen_by="settings", trials=())
     return chosen, {} if set(ELASTIC).isdisjoint(terms) else after
