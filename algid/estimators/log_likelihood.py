@@ -75,6 +75,10 @@ class Outcome:
     noise_change: float = 0.0
 
 
+_Part = tuple[Segment, Linearised, FloatArray]
+"""A piece, linearised, and how its innovations fall with log variances (m, 2 n)."""
+
+
 class LogEvidence:
     """One log: its source, the pieces it trains on, and their trajectories and noise levels so far.
 
@@ -135,14 +139,12 @@ class LogEvidence:
         """
         return bool(np.any((tau > _EXCESS * self._rough) & (self._rough > self._least)))
 
-    @property
-    def state(self) -> tuple[NoiseLevels, list[FloatArray]]:
-        """Noise levels and trajectories: what training changes."""
-        return self.noise, list(self._trajectories)
-
-    def restore(self, state: tuple[NoiseLevels, list[FloatArray]]) -> None:
-        """Forget what was trained since the log had this `state`."""
-        self.noise, self._trajectories, self.sure = state[0], list(state[1]), False
+    def afresh(self) -> LogEvidence:
+        """The same trajectories, whose noise levels start where they did."""
+        other = object.__new__(LogEvidence)  # the source is not gone over again
+        own = {"noise": self._guess, "sure": False, "_trajectories": self._trajectories[:]}
+        vars(other).update(vars(self) | own)
+        return other
 
     def train(self, shared: Shared, beta: FloatArray, *, free: bool = True) -> Outcome:
         """Linearise the training set at the parameters `beta` (Q,) of `shared`.
@@ -150,19 +152,21 @@ class LogEvidence:
         Keeps the trajectories found, and, where they are `free`, better noise levels, which the
         trajectories and the score follow. Levels that are sure stay.
         """
-        sums, c = _Sums(), shared.coefficients(beta, self.loaded)
+        c = shared.coefficients(beta, self.loaded)
         scores: list[VarianceScore] = []
         changes: list[FloatArray] = []
         scored = free and not self.sure
-        for seed, (piece, linear) in enumerate(self._trained(shared, c)):
-            self._trajectories[seed] = trajectory(piece, linear, self.noise)
-            by_noise = linear.columns[:0]
-            if scored:
-                score, by_noise, change = variance_score(linear, seed)
-                scores.append(score)
-                changes.append(change)
-            sums.add(linear, piece.dt, self.noise, by_noise)
-        outcome = sums.outcome(self.loaded, c)
+
+        def scoring() -> Iterator[_Part]:
+            for seed, (piece, linear, by_noise) in enumerate(self._trained(shared, c)):
+                self._trajectories[seed] = trajectory(piece, linear, self.noise)
+                if scored:
+                    score, by_noise, change = variance_score(linear, seed)
+                    scores.append(score)
+                    changes.append(change)
+                yield piece, linear, by_noise
+
+        outcome, by_noise = self._passed(c, scoring())
         if not scored:
             return outcome
         total = VarianceScore(*(np.sum(one, axis=0) for one in zip(*scores, strict=True)))
@@ -175,8 +179,8 @@ class LogEvidence:
             self._trajectories[place] = self._trajectories[place] + moved
         # every stretch bears as much of its change; scores have changes of their own
         less = np.tensordot(followed, total.absorbed, axes=1) / len(information.S)
-        fall = sums.products.values()[:, :, len(c) + 1 :] @ followed
-        information = replace(information, S=information.S - less, g=information.g - fall)
+        g = information.g - by_noise @ followed
+        information = replace(information, S=information.S - less, g=g)
         # in its own standard deviations
         most = float(np.max(np.abs(step) * np.sqrt(np.diag(total.average))))
         return replace(outcome, information=information, noise_change=most)
@@ -184,35 +188,45 @@ class LogEvidence:
     def held(self, shared: Shared, beta: FloatArray) -> Outcome:
         """Pass over the training set at `beta`; trajectories and noise levels stay."""
         c = shared.coefficients(beta, self.loaded)
-        return self._passed(c, self._trained(shared, c))
+        return self._passed(c, self._trained(shared, c))[0]
 
     def run(self, shared: Shared, beta: FloatArray) -> Outcome:
         """Pass over the whole log at `beta`; each piece has its own trajectory."""
         c = shared.coefficients(beta, self.loaded)
 
-        def linearised() -> Iterator[tuple[Segment, Linearised]]:
+        def linearised() -> Iterator[_Part]:
             for piece in self._pieces():
                 start = first_trajectory(piece.theta, piece.dt)
                 first = self._linearise(shared, c, start, piece, residual_only=True)
                 theta = trajectory(piece, first, self.noise)
-                yield piece, self._linearise(shared, c, theta, piece)
+                linear = self._linearise(shared, c, theta, piece)
+                yield piece, linear, linear.columns[:0]
 
-        return self._passed(c, linearised())
+        return self._passed(c, linearised())[0]
 
-    def _passed(self, c: FloatArray, parts: Iterable[tuple[Segment, Linearised]]) -> Outcome:
-        sums = _Sums()
-        for piece, linear in parts:
-            sums.add(linear, piece.dt, self.noise, linear.columns[:0])
-        return sums.outcome(self.loaded, c)
-
-    def _trained(self, shared: Shared, c: FloatArray) -> Iterator[tuple[Segment, Linearised]]:
+    def _trained(self, shared: Shared, c: FloatArray) -> Iterator[_Part]:
         """The training set at its trajectories and at the coefficients `c`."""
         for piece, theta in zip(self.kept, self._trajectories, strict=True):
-            yield piece, self._linearise(shared, c, theta, piece)
+            linear = self._linearise(shared, c, theta, piece)
+            yield piece, linear, linear.columns[:0]
 
-    def forget_noise(self) -> None:
-        """Noise levels start where they did."""
-        self.noise, self.sure = self._guess, False
+    def _passed(self, c: FloatArray, parts: Iterable[_Part]) -> tuple[Outcome, FloatArray]:
+        """What a pass at `c` (q,) gives, and how scores (B, q, m) fall with the noise."""
+        products, residuals, deviance = BlockSums(), list[ResidualSums](), 0.0
+        for piece, linear, by_noise in parts:
+            w, rows = linear.columns[-1], 2 * _STRETCH
+            own = (
+                w @ w + 2 * np.log(linear.factor[-1]).sum() + w.size * np.log(self.noise.tau).sum()
+            )
+            deviance += float(own)
+            columns = np.concatenate([linear.columns, by_noise])
+            padded = np.pad(columns, [(0, 0), (0, -w.size % rows)])
+            stretches = padded.reshape(len(columns), -1, rows).swapaxes(0, 1)
+            products.add(stretches[:, : len(c)] @ stretches.swapaxes(1, 2))
+            residuals.append(residual_sums(np.ascontiguousarray(w.reshape(-1, 2).T), piece.dt))
+        S, g, fall = np.split(products.values(), [len(c), len(c) + 1], axis=2)
+        information = LogInformation(self.loaded, c, S, g[:, :, 0])
+        return Outcome(information, reduce(add, residuals), deviance), fall
 
     @property
     def relative_error(self) -> float:
@@ -226,7 +240,7 @@ class LogEvidence:
         them the logarithm of the covariance's determinant.
         """
         gram, determinant, model = np.zeros(()), 0.0, shared.model
-        for piece, linear in self._trained(shared, c):
+        for piece, linear, _ in self._trained(shared, c):
             made = beside(model, c[: len(model.names)], linear.motion, piece.dt)
             rows = whiten(linear.factor, made / self.noise.tau[:, None])
             own, residual = np.split(linear.columns, [-1])
@@ -299,36 +313,3 @@ def _digitisation(kept: Sequence[Segment]) -> NoiseLevels:
 
 def _floored(noise: ArrayLike, floor: NoiseLevels) -> NoiseLevels:
     return NoiseLevels(*np.maximum(noise, floor))
-
-
-class _Sums:
-    """A log's innovations, and by stretches the products (q, q + 1 + m) of its columns.
-
-    Those are with themselves, with the innovations, and with how these fall with the noise.
-    """
-
-    def __init__(self) -> None:
-        self.products = BlockSums()
-        self._residual: list[ResidualSums] = []
-        self._deviance = 0.0
-
-    def add(self, linear: Linearised, dt: float, noise: NoiseLevels, by_noise: FloatArray) -> None:
-        """Add a piece, its samples `dt` s apart, whitened by such noise.
-
-        `by_noise` (m, 2 n) is how the innovations fall with log variances.
-        """
-        columns, w = np.concatenate([linear.columns, by_noise]), linear.columns[-1]
-        own = w @ w + 2 * np.log(linear.factor[-1]).sum() + w.size * np.log(noise.tau).sum()
-        self._deviance += float(own)
-        rows = 2 * _STRETCH
-        padded = np.pad(columns, [(0, 0), (0, -w.size % rows)])
-        parts = padded.reshape(len(columns), -1, rows).swapaxes(0, 1)
-        q = len(linear.columns) - 1
-        self.products.add(parts[:, :q] @ parts.swapaxes(1, 2))
-        self._residual.append(residual_sums(np.ascontiguousarray(w.reshape(-1, 2).T), dt))
-
-    def outcome(self, loaded: bool, c: FloatArray) -> Outcome:
-        """What the pass at the coefficients `c` (q,) has given."""
-        S, g, _ = np.split(self.products.values(), [len(c), len(c) + 1], axis=2)
-        information = LogInformation(loaded, c, S, g[:, :, 0])
-        return Outcome(information, reduce(add, self._residual), self._deviance)

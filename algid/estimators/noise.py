@@ -35,6 +35,7 @@ from algid.estimators.whitening import (
     NoiseLevels,
     forward,
     multipliers,
+    smeared,
     whiten,
 )
 
@@ -188,13 +189,13 @@ def variance_score(
     −Gᵀ V⁻¹ V_i V⁻¹e, and Gᵀ V⁻¹e for an angle's own variance.
     """
     lambdas = multipliers(linear.factor, linear.columns)
-    back, smeared = linear.to_angles(lambdas), linear.smeared_back(lambdas)
-    products = np.stack([x @ x.T for part in (back, smeared) for x in part.swapaxes(0, 1)])
-    whitened = whiten(linear.factor, _made(linear, back[-1], smeared[-1]))
+    back, spread = linear.to_angles(lambdas), smeared(lambdas, linear.taps[::-1])
+    products = np.stack([x @ x.T for part in (back, spread) for x in part.swapaxes(0, 1)])
+    whitened = whiten(linear.factor, _made(linear, back[-1], spread[-1]))
     change = -linear.to_angles(multipliers(linear.factor, whitened))
     change[[0, 1], [0, 1]] += back[-1]
     trace = np.zeros(4)
-    for on_angles, on_torques in _signs(seed, back.shape[-1], smeared.shape[-1]):
+    for on_angles, on_torques in _signs(seed, back.shape[-1], spread.shape[-1]):
         probe = whiten(linear.factor, _made(linear, on_angles, on_torques))
         trace += np.sum(probe**2, axis=1) / _PROBES
     score = VarianceScore(
@@ -209,7 +210,7 @@ def _made(linear: Linearised, angles: FloatArray, torques: FloatArray) -> FloatA
     for joint in range(2):
         own = [joint]
         made[joint] = forward(linear.H[:, own], angles[own], linear.first)
-        made[2 + joint, joint] = linear.smeared(torques[joint])
+        made[2 + joint, joint] = smeared(torques[joint], linear.taps)
     return made
 
 

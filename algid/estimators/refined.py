@@ -257,7 +257,7 @@ def _train(
 
 def _settled_width(
     trained: _Trained,
-    logs: Sequence[LogEvidence],
+    logs: list[LogEvidence],
     prior: Prior | None,
     progress: Progress | None,
 ) -> tuple[_Trained, FloatArray]:
@@ -265,6 +265,7 @@ def _settled_width(
 
     The weak form sees friction through a differentiator whose noise blurs the step: what it takes
     for the width may be several times the true one. The likelihood may be refuted by that alone.
+    The `logs` are those of that width then.
     """
 
     def of_width(width: float) -> Shared:
@@ -286,15 +287,11 @@ def _settled_width(
         moved = abs(np.log(width / now))
         if moved < _WIDTH_SETTLED or (trained.end != "settled" and moved < _WIDTH_FAR):
             break
-        states = [log.state for log in logs]
-        for log in logs:
-            log.forget_noise()
-        again = _train(of_width(width), logs, trained.beta, prior, progress)
+        anew = [log.afresh() for log in logs]
+        again = _train(of_width(width), anew, trained.beta, prior, progress)
         if again.end == "unsettled" and trained.end == "settled":
-            for log, state in zip(logs, states, strict=True):  # too narrow a step for the motion
-                log.restore(state)
-            break
-        trained = again
+            break  # too narrow a step for the motion
+        trained, logs[:] = again, anew
         if trained.end != "settled":
             break
     return trained, added

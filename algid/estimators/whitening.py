@@ -75,17 +75,9 @@ class Linearised:
         """Hᵀ (..., 2, N) of rows (..., 2, n)."""
         return adjoint(self.H, rows, self.first, self.angles)
 
-    def smeared(self, torques: FloatArray) -> FloatArray:
-        """F of torque noise (..., n)."""
-        return _padded(torques, self.taps)
 
-    def smeared_back(self, rows: FloatArray) -> FloatArray:
-        """Fᵀ of rows (..., n)."""
-        return _padded(rows, self.taps[::-1])
-
-
-def _padded(rows: FloatArray, taps: FloatArray) -> FloatArray:
-    """Weighted sums (..., n) of rows (..., n) that are zero beyond their ends."""
+def smeared(rows: FloatArray, taps: FloatArray) -> FloatArray:
+    """F of torque noise (..., n), zero beyond its ends; Fᵀ by the taps from behind."""
     reach = taps.size // 2
     return weighted(np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(reach, reach)]), taps)
 
