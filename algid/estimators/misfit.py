@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from algid.arm import FloatArray, keep_arrays
 from algid.base.compiled import chi2_tail
 from algid.base.names import places_outside, vector, within
-from algid.estimators.combine import scaled_pinv
+from algid.estimators.combine import RANK_TOLERANCE, scaled_pinv
 from algid.estimators.hold import Lateness
 from algid.estimators.log_likelihood import Beside, LogEvidence
 from algid.estimators.parametrisation import Shared
@@ -168,12 +168,21 @@ class Products:
         return np.flatnonzero([label in names for label in self._labels])
 
     def solve(self, columns: NDArray[np.int64]) -> tuple[FloatArray, float, FloatArray]:
-        """Least squares on `columns`: p (P,), the squares left, and the inverse of its matrix."""
+        """Least squares on `columns`: p (P,), the squares left, and the inverse of its matrix.
+
+        Squares that are nothing but the rounding of the torque's count as none.
+        """
         inverse = scaled_pinv(self.total[np.ix_(columns, columns)])
         p = np.zeros(self.size)
         p[columns] = inverse @ self.total[columns, -1]
-        left = float(self.total[-1, -1] - p[columns] @ self.total[columns, -1])
-        return p, max(left, 0.0), inverse
+        v = np.append(-p, 1.0)
+        left = float(v @ self.total @ v)
+        return p, left if left > RANK_TOLERANCE * self.total[-1, -1] else 0.0, inverse
+
+    def explained(self, own: NDArray[np.int64], rest: NDArray[np.int64]) -> float:
+        """By how much columns `own` lower the squares beside the columns `rest`."""
+        M, b = left_beside(self.total, rest, np.setdiff1d(own, rest))
+        return float(b @ scaled_pinv(M) @ b)
 
     def coefficients(self, p: FloatArray) -> At:
         """Coefficients by name of unloaded and of loaded logs, the delay whole."""
@@ -318,27 +327,38 @@ def misfit(
     kinds = np.array(
         [TERM_OF[names[place]] for place in absent] + 2 * [kind for kind, _ in _SHAPES]
     )
-    rest = [*free, -1, *absent, *range(len(names), len(names) + 2 * len(_SHAPES))]
+    rest = [*free, *absent, *range(len(names), len(names) + 2 * len(_SHAPES)), -1]
     Q, whole = len(fit.names), np.zeros(())
     for loaded, gram in products.each:
         by_shared = np.zeros((len(gram), Q + len(rest)))
         by_shared[present, :Q] = shared.jacobian(fit.values, loaded)
         by_shared[rest, Q + np.arange(len(rest))] = 1
         whole = whole + by_shared.T @ gram @ by_shared
-    P = Q + len(free)
-    S, X, G = whole[:P, :P], whole[:P, P + 1 :], whole[P + 1 :, P + 1 :]
     if fit.prior is not None:
         known = fit.prior.places(fit.names)
-        S[np.ix_(known, known)] += fit.prior.precision
-    D = scaled_pinv(S) @ X  # what the parameters take up
-    M, b = G - X.T @ D, whole[P + 1 :, P] - D.T @ whole[:P, P]
-    beside = np.diag(M) > _OWN * np.diag(G)
+        whole[np.ix_(known, known)] += fit.prior.precision
+    taken, tried = np.split(np.arange(len(whole) - 1), [Q + len(free)])
+    M, b = left_beside(whole, taken, tried)
+    beside = np.diag(M) > _OWN * np.diag(whole)[tried]
     p_values = []
     for own in (beside, *(beside & (kinds == kind) for kind in dict.fromkeys(kinds[beside]))):
         rank, statistic = _score(M, b, np.flatnonzero(own))
         p_values.append(float(chi2_tail(max(rank, 1), statistic)))
     together, *alone = p_values
     return min(1.0, 2 * together, 2 * len(alone) * min(alone, default=1.0))
+
+
+def left_beside(
+    total: FloatArray, taken: NDArray[np.int64], own: NDArray[np.int64]
+) -> tuple[FloatArray, FloatArray]:
+    """M (m, m) and b (m,) of columns `own` beside those `taken`, by the products of all columns.
+
+    The last column is the residual.
+    """
+    both = np.append(own, -1)
+    cross = total[np.ix_(taken, both)]
+    left = total[np.ix_(both, both)] - cross.T @ scaled_pinv(total[np.ix_(taken, taken)]) @ cross
+    return left[:-1, :-1], left[:-1, -1]
 
 
 def _score(M: FloatArray, b: FloatArray, own: NDArray[np.int64]) -> tuple[int, float]:

@@ -247,9 +247,8 @@ class _Search:
 
     def explained(self, term: str, beside: Sequence[str]) -> float:
         """By how much `term` lowers the squares."""
-        _, without, _ = self.first.solve(self.first.columns(beside))
-        _, left, _ = self.first.solve(self.first.columns([*beside, term]))
-        return without - left
+        columns = self.first.columns
+        return self.first.explained(columns([*beside, term]), columns(beside))
 
     def beyond_sampling(self, term: str, beside: Sequence[str]) -> bool:
         """Whether the squares fall by more than what the stamps of a log without noise leave open.
