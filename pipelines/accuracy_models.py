@@ -46,7 +46,15 @@ def draw(row: str, mode: str, arm: int, seed: int, made: tuple[Scene, Scene]) ->
     wanted = np.array([made[0].truth[name] for name in names])
     z = np.abs(fit.values[places] - wanted) / fit.std[places]
     error = np.abs(fit.values[places] / wanted - 1)
-    return {
+    dry: Seen = {}
+    for kind in ("f", "s"):
+        for name in (f"{kind}1", f"{kind}2"):
+            if name in fit.names and made[0].truth[name]:
+                place = fit.names.index(name)
+                far = abs(fit.values[place] - made[0].truth[name]) / fit.std[place]
+                dry.setdefault(f"{kind} held", []).append(far <= fit.quantile)
+                dry.setdefault(f"{kind} far", []).append(far)
+    return dry | {
         "by": [fit.estimator],
         "terms": [*chosen.model.terms, *(["delay"] if chosen.delay else [])],
         "held": (z <= fit.quantile).tolist(),
@@ -77,6 +85,9 @@ if __name__ == "__main__":
         "95th percentile, σ": number("z", lambda z: np.percentile(z, 95)),
         "k: median, %": number("k", np.median, 100),
         "m_p": number("m_p", np.median, 100),
+        "Coulomb held": share("f held"),
+        "Stribeck held": share("s held"),
+        "farthest, σ": number("s far", np.max),
         "terms": words("terms"),
     }
     experiment("models", __doc__, rows, draw, columns, draws=4)

@@ -203,7 +203,10 @@ def _sensed(
     rng = np.random.default_rng([seed, loaded])
     walk = np.cumsum(rng.standard_normal(tau.shape), axis=1) / np.sqrt(count)
     tau = tau + size[:, None] * (errors.offset * np.array([[1.0], [-1.0]]) + errors.drift * walk)
-    return Scene(theta - np.array(errors.zero)[:, None], tau, _truth(seed, errors))
+    truth = _truth(seed, errors)
+    for name, share in (("f", errors.coulomb), ("s", errors.stribeck)):
+        truth |= {f"{name}{joint + 1}": errors.gains[0] * share * size[joint] for joint in range(2)}
+    return Scene(theta - np.array(errors.zero)[:, None], tau, truth)
 
 
 def _truth(seed: int, errors: Errors) -> dict[str, float]:

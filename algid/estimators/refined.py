@@ -21,10 +21,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, reduce
+from itertools import combinations
 from operator import add
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.base.criteria import SETTLED
@@ -45,6 +47,7 @@ from algid.estimators.repeats import Groups, grouped
 from algid.estimators.weak import fit as weak_fit
 from algid.model import TERMS, acting
 from algid.notices import Notice
+from algid.physics.signals import TRIED
 from algid.signals.segments import Segment
 
 _STEPS = 20
@@ -100,9 +103,8 @@ def fit(problem: Problem) -> Fit:
 
     try:
         trained = _train(start.shared, logs, start.values, anchored, problem.progress)
-        iterations, of_width = trained.steps, np.zeros_like(start.covariance)
-        if any(_SHAPE in TERMS[term].shapes for term in start.shared.model.terms):
-            trained, of_width = _settled_width(trained, logs, anchored, problem.progress)
+        iterations = trained.steps
+        trained, of_width = _settled_widths(trained, logs, anchored, problem.progress)
         if trained.end == "refuted":
             return given_up("noise")
         if trained.end == "unsettled" or not np.all(np.isfinite(trained.beta)):
@@ -255,25 +257,31 @@ def _train(
     return _Trained(shared, beta, outcomes, steps, "settled" if close else "unsettled")
 
 
-def _settled_width(
+def _settled_widths(
     trained: _Trained,
     logs: list[LogEvidence],
     prior: Prior | None,
     progress: Progress | None,
 ) -> tuple[_Trained, FloatArray]:
-    """What was `trained`, at the likeliest width of friction's step, and what that adds (Q, Q).
+    """What was `trained`, at the likeliest widths of friction, and what these add (Q, Q).
 
     The weak form sees friction through a differentiator whose noise blurs the step: what it takes
-    for the width may be several times the true one. The likelihood may be refuted by that alone.
-    The `logs` are those of that width then.
+    for a width may be several times the true one. The likelihood may be refuted by that alone.
+    The `logs` are those of these widths then.
     """
+    terms = trained.shared.model.terms
+    names = [name for name in TRIED if any(name in TERMS[term].shapes for term in terms)]
+    added: FloatArray = np.zeros((trained.beta.size,) * 2)
+    if not names:
+        return trained, added
 
-    def of_width(width: float) -> Shared:
+    def model_of(widths: FloatArray) -> Shared:
         shared = trained.shared
-        return replace(shared, model=replace(shared.model, coulomb_speed=width))
+        held = dict(zip(names, widths.tolist(), strict=True))
+        return replace(shared, model=replace(shared.model, **held))
 
-    def profile(width: float) -> tuple[float, FloatArray]:
-        other, beta = of_width(width), trained.beta
+    def profile(widths: FloatArray) -> tuple[float, FloatArray]:
+        other, beta = model_of(widths), trained.beta
         try:
             seen = [log.held(other, beta) for log in logs]
         except np.linalg.LinAlgError:  # so narrow a step does not go with the trajectories
@@ -281,14 +289,15 @@ def _settled_width(
         better, _, value = combine(other, [outcome.information for outcome in seen], beta, prior)
         return sum(outcome.deviance for outcome in seen) - 2 * value, better
 
+    ends = np.array([(_NARROWER * min(TRIED[name]), _WIDER * max(TRIED[name])) for name in names])
     for _ in range(_WIDTHS):
-        now = trained.shared.model.coulomb_speed
-        width, added = likeliest_width(profile, now)
-        moved = abs(np.log(width / now))
+        now = np.array([getattr(trained.shared.model, name) for name in names])
+        widths, added = likeliest_widths(profile, now, ends)
+        moved = float(np.abs(np.log(widths / now)).max())
         if moved < _WIDTH_SETTLED or (trained.end != "settled" and moved < _WIDTH_FAR):
             break
         anew = [log.afresh() for log in logs]
-        again = _train(of_width(width), anew, trained.beta, prior, progress)
+        again = _train(model_of(widths), anew, trained.beta, prior, progress)
         if again.end == "unsettled" and trained.end == "settled":
             break  # too narrow a step for the motion
         trained, logs[:] = again, anew
@@ -320,54 +329,70 @@ def _count(outcomes: Sequence[Outcome]) -> float:
     return float(sum(outcome.residual.counts[0] for outcome in outcomes))
 
 
-Profile = Callable[[float], tuple[float, FloatArray]]
-"""By a width in rad/s the deviance, and the best parameters (Q,)."""
-NARROWEST, WIDEST = 0.004, 1.0
-"""rad/s: no joint's friction turns in less, and none in more."""
+Profile = Callable[[FloatArray], tuple[float, FloatArray]]
+"""By widths (W,) in rad/s the deviance, and the best parameters (Q,)."""
+_NARROWER, _WIDER = 0.4, 3.125
+"""How far widths may lie beyond those that logs are tried with: no joint's friction turns in less
+than 0.004 rad/s, and none in more than 1."""
 _HALF_OCTAVE = 0.5 * np.log(2.0)
-_SHAPE = "coulomb_speed"
 
 
-def likeliest_width(profile: Profile, start: float) -> tuple[float, FloatArray]:
-    """The width in rad/s at which the deviance is least, walking from `start`.
+def likeliest_widths(
+    profile: Profile, start: FloatArray, ends: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """The widths (W,) in rad/s at which the deviance is least, walking from `start`.
 
-    With it what not knowing it adds to the parameters' covariance (Q, Q).
+    With them what not knowing them adds to the parameters' covariance (Q, Q).
 
     Parameters
     ----------
     profile : callable
-    start : float, rad/s
+    start : (W,), rad/s
+    ends : (W, 2), the narrowest and the widest, rad/s
     """
-    low, high = np.log(NARROWEST), np.log(WIDEST)
-    first, h = float(np.clip(np.log(start), low, high)), _HALF_OCTAVE
+    low, high = np.log(ends).T
+    first, h = np.clip(np.log(start), low, high), _HALF_OCTAVE
+    along = np.eye(start.size, dtype=np.int64)
 
     @cache
-    def seen(place: int) -> tuple[float, FloatArray]:
-        """By half octaves from the first width."""
-        x = first + place * h
-        return profile(float(np.exp(x))) if low <= x <= high else (np.inf, np.empty(0))
+    def seen(place: tuple[int, ...]) -> tuple[float, FloatArray]:
+        """By half octaves from the first widths."""
+        x = first + np.multiply(place, h)
+        inside = np.all((low <= x) & (x <= high))
+        return profile(np.exp(x)) if inside else (np.inf, np.empty(0))
 
-    def deviance(place: int) -> float:
+    def deviance(place: tuple[int, ...]) -> float:
         value, _ = seen(place)
         return value if np.isfinite(value) else np.inf
 
-    place = 0
+    def beside(*sides: NDArray[np.int64]) -> tuple[int, ...]:
+        return tuple(np.add(place, np.sum(sides, axis=0)).tolist())
+
+    place = (0,) * start.size
     for step in (2, 1):
-        while deviance(best := min(place - step, place + step, key=deviance)) < deviance(place):
+        while True:
+            around = [beside(side * step * one) for one in along for side in (-1, 1)]
+            best = min(around, key=deviance)
+            if deviance(best) >= deviance(place):
+                break
             place = best
-    x, around = first + place * h, [deviance(place + side) for side in (-1, 0, 1)]
-    if not np.all(np.isfinite(around)):
-        return float(np.exp(x)), np.zeros((seen(place)[1].size,) * 2)
-    offset, curvature = parabola(*around)
-    change = (seen(place + 1)[1] - seen(place - 1)[1]) / (2 * h)
-    variance = min(2.0 * h**2 / curvature, (high - low) ** 2 / 12)
-    return float(np.exp(x + h * offset)), variance * np.outer(change, change)
-
-
-def parabola(below: float, here: float, above: float) -> tuple[float, float]:
-    """The bottom of a parabola through three values a step apart, in steps from the middle one.
-
-    No further than a step; and its curvature.
-    """
-    curvature = max(below - 2 * here + above, 1e-300)
-    return float(np.clip(0.5 * (below - above) / curvature, -1, 1)), curvature
+    x, here = first + np.multiply(place, h), deviance(place)
+    below = np.array([deviance(beside(-one)) for one in along])
+    above = np.array([deviance(beside(one)) for one in along])
+    H = np.diag(below - 2 * here + above)
+    for i, j in combinations(range(start.size), 2):
+        mixed = sum(
+            a * b * deviance(beside(a * along[i], b * along[j])) for a in (-1, 1) for b in (-1, 1)
+        )
+        H[i, j] = H[j, i] = 0.25 * mixed
+    if not np.all(np.isfinite(H)):
+        return np.exp(x), np.zeros((seen(place)[1].size,) * 2)
+    # in shares of what lies between the ends, of which the widths have a share at least
+    span = (high - low) / h
+    curvature, axes = np.linalg.eigh(H * np.outer(span, span))
+    to = axes * span[:, None]
+    offset = to @ ((to.T @ (0.5 * (below - above))) / np.maximum(curvature, 1e-300))
+    changes = [(seen(beside(one))[1] - seen(beside(-one))[1]) / 2 for one in along]
+    moved = to.T @ np.array(changes)
+    variance = np.minimum(2.0 / np.maximum(curvature, 1e-300), 1 / 12)
+    return np.exp(x + h * np.clip(offset, -1, 1)), (moved.T * variance) @ moved

@@ -43,7 +43,6 @@ from algid.estimators.log_likelihood import opened
 from algid.estimators.misfit import At, Products, misfit
 from algid.estimators.modulating_functions import Known, row_weights
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
-from algid.estimators.refined import parabola
 from algid.model import (
     CHOICES,
     DELAYS,
@@ -212,7 +211,8 @@ def _start(
             costs.append(solved(replace(trial, terms=terms))[0])
         least, offset = int(np.argmin(costs)), 0.0
         if 0 < least < len(costs) - 1:
-            offset, _ = parabola(*costs[least - 1 : least + 2])
+            below, here, above = costs[least - 1 : least + 2]  # a parabola's bottom
+            offset = 0.5 * (below - above) / max(below - 2 * here + above, 1e-300)
         best = float(values[least] * (values[1] / values[0]) ** offset)
         model = replace(model, **{shape: best})  # type: ignore[arg-type]
     model = replace(model, terms=firsts)

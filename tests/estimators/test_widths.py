@@ -10,7 +10,7 @@ import pytest
 from algid.arm import FloatArray
 from algid.estimators import refined
 from algid.estimators.problem import WeakSettings
-from algid.estimators.refined import likeliest_width
+from algid.estimators.refined import likeliest_widths
 from algid.model import Model
 from algid.signals.segments import Segment
 from pipelines.accuracy_scenes import random_arm, waves
@@ -57,13 +57,28 @@ def test_the_width_that_starts_the_fit_does_not_stay_in_it() -> None:
 def test_the_parabola_through_the_lowest_values_has_the_widths_variance(start: float) -> None:
     """D = (log ω - log 0.03)² / 0.2² has a deviation of 0.2; β grows by (3, -1) a unit."""
 
-    def profile(width: float) -> tuple[float, FloatArray]:
-        x = np.log(width / 0.03)
+    def profile(widths: FloatArray) -> tuple[float, FloatArray]:
+        (x,) = np.log(widths / 0.03)
         return float((x / 0.2) ** 2), np.array([3.0, -1.0]) * x
 
-    width, added = likeliest_width(profile, start)
+    (width,), added = likeliest_widths(profile, np.array([start]), np.array([[0.004, 1.0]]))
     assert width == pytest.approx(0.03)
     np.testing.assert_allclose(added, 0.2**2 * np.outer([3, -1], [3, -1]))
+
+
+def test_two_widths_that_go_together_have_their_common_covariance() -> None:
+    """D = dᵀ C⁻¹ d, with d the distance of the logarithms from those of (0.1, 0.3)."""
+    C, at = np.array([[0.04, 0.03], [0.03, 0.09]]), np.array([0.1, 0.3])
+    B = np.array([[3.0, -1.0], [0.5, 2.0], [0.0, 1.0]])
+
+    def profile(widths: FloatArray) -> tuple[float, FloatArray]:
+        d = np.log(widths / at)
+        return float(d @ np.linalg.inv(C) @ d), B @ d
+
+    ends = np.array([[0.004, 1.0], [0.04, 2.8]])
+    widths, added = likeliest_widths(profile, np.array([0.02, 1.1]), ends)
+    np.testing.assert_allclose(widths, at)
+    np.testing.assert_allclose(added, B @ C @ B.T, atol=1e-12)
 
 
 def test_friction_that_is_not_there_leaves_its_width_open_and_nothing_else() -> None:
