@@ -13,6 +13,7 @@ import pytest
 from scipy.signal import lfilter
 
 import algid
+from algid.arm import CONSTANT_NAMES
 from algid.base.errors import LogError
 from algid.identification.identify import identify
 from algid.identification.recordings import open_source
@@ -20,6 +21,7 @@ from algid.log import Log
 from algid.profile import Profile
 from algid.results import Result, Status, read_result
 from algid.settings import Settings
+from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.sensors import Sensors
 from algid.synth.simulator import simulate
@@ -49,6 +51,32 @@ def test_paper_observer_and_poles_stay_within_the_paper_s_own_bound() -> None:
         errors = {row.parameter: row.error_percent for row in result.table4}
         assert len(errors) == 12
         assert all(error is not None and error <= 0.6826 for error in errors.values()), errors
+
+
+def test_a_result_says_what_the_simulator_knows(noisy: tuple[Log, Log]) -> None:
+    """Noise of the sensors, no term, an even torque, white innovations, and the arm's truth."""
+    result = identify(*noisy)
+    fit, case = result.fit, load_case("case1")
+    assert fit is not None
+    assert [fit.noise[name] for name in ("theta1", "theta2")] == pytest.approx([1e-3] * 2, rel=0.02)
+    # angles' noise hides most of the torques'
+    assert [fit.noise[name] for name in ("tau1", "tau2")] == pytest.approx([1e-2] * 2, rel=0.25)
+    for test in fit.whiteness.values():
+        assert test.white
+        assert test.p_value is not None
+        assert test.p_value > 0.01
+        assert abs(test.lag1_correlation) < 0.05
+    assert fit.torque_hold.used == "foh"
+    assert not any(one.kept for one in fit.terms)
+    evidence = {one.term: one.evidence for one in fit.terms}
+    # without Coulomb friction these two change nothing
+    assert {term for term, worth in evidence.items() if worth == 0} == {"stribeck", "asymmetry"}
+    assert all(worth is not None and -12 < worth <= 0 for worth in evidence.values())
+    arm = case.arm
+    constants = dict(zip(CONSTANT_NAMES, arm.constants().tolist(), strict=True))
+    tip = {"m_p": case.payload, "l1": arm.l1, "l2": arm.l2}
+    assert result.truth == pytest.approx(constants | tip, rel=1e-12)
+    assert [one.rows for one in result.logs] == [len(log) for log in noisy]
 
 
 def test_folder_holds_schema_valid_result_and_flat_series(

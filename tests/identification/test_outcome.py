@@ -26,7 +26,7 @@ from algid.identification.outcome import (
 from algid.identification.recordings import Recordings, open_source
 from algid.identification.validate import prediction
 from algid.log import Log, Origin
-from algid.notices import Notice
+from algid.notices import Notice, of_codes
 from algid.results import Estimate, FitSummary, Repeatability, Status
 from algid.settings import Settings
 from algid.table4 import LOADED_ROWS, UNLOADED_ROWS
@@ -174,6 +174,15 @@ def test_a_payload_near_zero_is_at_most_the_end_of_its_interval() -> None:
     lost = with_stds(fit_of(), m_p=np.inf)
     assert found(lost, "LENGTHS_NEEDED")
     assert not found(with_stds(fit_of(lengths={"l1": ARM.l1}), m_p=np.inf), "LENGTHS_NEEDED")
+
+
+@pytest.mark.parametrize(("deviations", "named"), [(100.0, True), (2.0, False)])
+def test_a_payload_far_below_zero_means_that_the_logs_are_exchanged(
+    deviations: float, named: bool
+) -> None:
+    fit = with_values(fit_of(), m_p=-0.01 * PAYLOAD * deviations)
+    found = of_codes(outcome_of(Fitted(fit, survey())).notices, "LOGS_APART")
+    assert [one.numbers["case"] for one in found] == ["exchanged"] * named
 
 
 def test_a_length_that_the_constants_contradict_is_named() -> None:
