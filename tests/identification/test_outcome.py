@@ -221,6 +221,16 @@ def test_repeatability_and_a_gain_of_one_are_told_in_numbers() -> None:
     assert told["TORQUE_GAIN:known"].note
 
 
+def test_a_known_payload_gives_the_torques_gain_with_the_ends_of_its_interval() -> None:
+    """A weight of which the arm says 0.5 kg and the scales 0.51: the gain is 1.02."""
+    fit = with_stds(with_values(fit_of(), m_p=0.5), m_p=0.01)
+    gain = summed(fit, payload_mass=0.51).torque_gain
+    assert gain is not None
+    assert gain.estimate == pytest.approx(1.02)
+    half = 0.01 * QUANTILE
+    assert gain.ci95 == pytest.approx((0.51 / (0.5 + half), 0.51 / (0.5 - half)))
+
+
 def test_cross_validation_that_could_not_be_done_is_told() -> None:
     outcome = outcome_of(Fitted(fit_of(), survey(), Settings(cross_validate=True)))
     assert [one.code for one in outcome.notices] == ["SHORT_LOG"]

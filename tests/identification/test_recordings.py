@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid.base.errors import LogError
+from algid.base.errors import LogError, SettingError
+from algid.identification.identify import identify
 from algid.identification.recordings import (
     Recordings,
     Staged,
@@ -19,8 +20,11 @@ from algid.identification.recordings import (
     open_sources,
 )
 from algid.log import Log, Origin, Truth
+from algid.notices import of_codes
+from algid.settings import Settings
 from algid.synth.cases import load_case
 from algid.writers import write_log
+from pipelines.saturation import log_of
 from tests.identification.fits import in_blocks
 
 ARM = load_case("case1").arm
@@ -121,3 +125,33 @@ def test_the_named_checks_refuse_a_log_only_where_they_see_all_of_it(
     else:
         assert sum(map(len, survey.segments(survey.logs[0]))) == 600
         assert any(notice.code == "EFFORT_ZERO" for notice in survey.whole(survey.logs[0]).notices)
+
+
+def test_a_log_whose_payload_changes_is_sent_to_track() -> None:
+    log = moving(payload=0.0)
+    assert log.origin.truth is not None
+    truth = replace(log.origin.truth, schedule=((0.3, 0.2),))
+    with pytest.raises(LogError, match=r"^log.csv: .* payload changes; weigh it with algid track$"):
+        open_source(replace(log, origin=replace(log.origin, truth=truth)), "unloaded")
+
+
+def test_stamps_that_no_arm_is_sampled_by_are_refused_by_the_name_of_their_log() -> None:
+    log = moving()
+    fast = replace(log, stamp_ns=np.arange(len(log), dtype=np.int64))
+    with pytest.raises(LogError, match=r"^log.csv: its stamps are 1 ns apart"):
+        identify(fast)
+
+
+def test_samples_beyond_a_limit_are_counted_over_all_blocks() -> None:
+    _, log = log_of("case1", "sensor", 0.6, 0)
+    recording = in_blocks(log, [3000, 7000])
+    survey = Recordings([recording])
+    list(survey.segments(recording))
+    told = of_codes(survey.notices(recording), "CLIPPED_TORQUE")
+    for one, tau in zip(told, log.tau, strict=True):
+        assert one.numbers["count"] == np.count_nonzero(np.abs(tau) >= one.numbers["level"]) > 700
+
+
+def test_one_log_cannot_be_cross_validated() -> None:
+    with pytest.raises(SettingError, match="expected two unloaded logs or more, found one"):
+        identify(moving(samples=3000), settings=Settings(cross_validate=True))
