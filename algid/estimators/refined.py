@@ -6,12 +6,12 @@ and for the noise levels. Where pieces were left out, one pass over everything a
 values and one more step make the estimate efficient (Le Cam's one-step estimator): the start is
 already within its own error bars.
 
-Of the width ω_s of dry friction's step the deviance D (minus twice the log-likelihood, all other
-parameters at their best) is walked down
-over x = log ω_s, by octaves and then by half octaves. A parabola through the three lowest values
-has its bottom at the width, and by its curvature
+Over x, the logarithms of friction's widths ω_s and ω_S, the deviance D (minus twice the
+log-likelihood, all other parameters at their best) is walked down by octaves and then by half
+octaves. A paraboloid through the lowest value and those beside it has its bottom at the widths, and
+by its curvature
 
-    Var(x) = 2 / D″,   Cov(β) gains  Var(x) β′ β′ᵀ
+    Cov(x) = 2 (D″)⁻¹,   Cov(β) gains  β′ Cov(x) β′ᵀ
 
 with β′ the change of the best parameters with x.
 """
@@ -275,13 +275,13 @@ def _settled_widths(
     if not names:
         return trained, added
 
-    def model_of(widths: FloatArray) -> Shared:
+    def shared_at(widths: FloatArray) -> Shared:
         shared = trained.shared
         held = dict(zip(names, widths.tolist(), strict=True))
         return replace(shared, model=replace(shared.model, **held))
 
     def profile(widths: FloatArray) -> tuple[float, FloatArray]:
-        other, beta = model_of(widths), trained.beta
+        other, beta = shared_at(widths), trained.beta
         try:
             seen = [log.held(other, beta) for log in logs]
         except np.linalg.LinAlgError:  # so narrow a step does not go with the trajectories
@@ -297,7 +297,7 @@ def _settled_widths(
         if moved < _WIDTH_SETTLED or (trained.end != "settled" and moved < _WIDTH_FAR):
             break
         anew = [log.afresh() for log in logs]
-        again = _train(model_of(widths), anew, trained.beta, prior, progress)
+        again = _train(shared_at(widths), anew, trained.beta, prior, progress)
         if again.end == "unsettled" and trained.end == "settled":
             break  # too narrow a step for the motion
         trained, logs[:] = again, anew
@@ -377,22 +377,24 @@ def likeliest_widths(
                 break
             place = best
     x, here = first + np.multiply(place, h), deviance(place)
-    below = np.array([deviance(beside(-one)) for one in along])
-    above = np.array([deviance(beside(one)) for one in along])
-    H = np.diag(below - 2 * here + above)
-    for i, j in combinations(range(start.size), 2):
-        mixed = sum(
-            a * b * deviance(beside(a * along[i], b * along[j])) for a in (-1, 1) for b in (-1, 1)
-        )
-        H[i, j] = H[j, i] = 0.25 * mixed
-    if not np.all(np.isfinite(H)):
+    # a width at an end of its range is taken for known
+    free = [one for one in along if np.isfinite(deviance(beside(one)) + deviance(beside(-one)))]
+    if not (free and np.isfinite(here)):
         return np.exp(x), np.zeros((seen(place)[1].size,) * 2)
-    # in shares of what lies between the ends, of which the widths have a share at least
-    span = (high - low) / h
+    below, above = np.array([[deviance(beside(side * one)) for one in free] for side in (-1, 1)])
+    H = np.diag(below - 2 * here + above)
+    for i, j in combinations(range(len(free)), 2):
+        mixed = sum(
+            a * b * deviance(beside(a * free[i], b * free[j])) for a in (-1, 1) for b in (-1, 1)
+        )
+        H[i, j] = H[j, i] = 0.25 * mixed if np.isfinite(mixed) else 0.0
+    # in shares of what lies between the ends, of which no width is known worse than if all of it
+    # were as likely
+    span = np.array(free) @ ((high - low) / h)
     curvature, axes = np.linalg.eigh(H * np.outer(span, span))
-    to = axes * span[:, None]
-    offset = to @ ((to.T @ (0.5 * (below - above))) / np.maximum(curvature, 1e-300))
-    changes = [(seen(beside(one))[1] - seen(beside(-one))[1]) / 2 for one in along]
+    curvature, to = np.maximum(curvature, 1e-300), axes * span[:, None]
+    offset = np.transpose(free) @ (to @ (to.T @ (0.5 * (below - above)) / curvature))
+    changes = [(seen(beside(one))[1] - seen(beside(-one))[1]) / 2 for one in free]
     moved = to.T @ np.array(changes)
-    variance = np.minimum(2.0 / np.maximum(curvature, 1e-300), 1 / 12)
+    variance = np.minimum(2.0 / curvature, 1 / 12)
     return np.exp(x + h * np.clip(offset, -1, 1)), (moved.T * variance) @ moved

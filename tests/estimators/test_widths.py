@@ -81,6 +81,21 @@ def test_two_widths_that_go_together_have_their_common_covariance() -> None:
     np.testing.assert_allclose(added, B @ C @ B.T, atol=1e-12)
 
 
+def test_a_width_at_its_end_leaves_the_other_one_its_variance() -> None:
+    """The second falls for ever; the first has a deviation of 0.2 about 0.1."""
+
+    def profile(widths: FloatArray) -> tuple[float, FloatArray]:
+        x, y = np.log(widths / 0.1)
+        return float((x / 0.2) ** 2 - y), np.array([x, y])
+
+    widths, added = likeliest_widths(
+        profile, np.array([0.1, 1.0]), np.array([[0.004, 1.0], [0.04, 2.8]])
+    )
+    assert widths[0] == pytest.approx(0.1)
+    assert 1.9 < widths[1] <= 2.8
+    np.testing.assert_allclose(added, np.diag([0.04, 0.0]), atol=1e-12)
+
+
 def test_friction_that_is_not_there_leaves_its_width_open_and_nothing_else() -> None:
     log, truth = rubbing()
     still = replace(log, theta=log.theta[:, :400], tau=log.tau[:, :400])
