@@ -114,15 +114,20 @@ def rows_of(
     drift: Drift,
     moments: Sequence[float],
     masses: Sequence[float],
+    *,
+    settle: bool = True,
 ) -> Rows:
-    """Rows of a piece with payloads of `masses` kg that change at the known `moments` in s."""
+    """Rows of a piece with payloads of `masses` kg that change at the known `moments` in s.
+
+    `settle` is that of `IdentifiedArm.linearised`.
+    """
     t = arm.times(piece) + arm.shift
     mass = np.asarray(masses)[np.searchsorted(np.asarray(moments), t, side="right")]
     # Each row at its own mass and friction: the angles' noise passes through the torque's partial
     # derivatives, which are theirs.
     c = arm.k[:, None] + np.outer(arm.unit, mass)
     c[arm.friction] += drift.at(t).T
-    linear = arm.linearised(piece, c)
+    linear = arm.linearised(piece, c, settle=settle)
     J, _ = modelled(arm.model, c, linear.motion, piece.dt)
     g = np.einsum("q,aqn->an", arm.unit, J) / arm.noise.tau[:, None]
     before, theta = arm.k + arm.unit * masses[0], linear.motion.theta
@@ -203,7 +208,9 @@ def confirmed(
     places, masses = list(changes), list(weighed)
     penalty, count = PENALTY * variance, None
 
-    def rows_about(groups: Sequence[tuple[int, int]]) -> Iterator[tuple[tuple[int, int], Rows]]:
+    def rows_about(
+        groups: Sequence[tuple[int, int]], *, settle: bool = True
+    ) -> Iterator[tuple[tuple[int, int], Rows]]:
         """The rows about each group of changes, from its first to its last, in one pass.
 
         They hold the masses about the group, and no other.
@@ -217,7 +224,7 @@ def confirmed(
             first, last = groups[at]
             if len(piece) > 2 * POINTS:
                 own = times[first : last + 1], masses[first : last + 2]
-                yield groups[at], rows_of(piece, arm, drift, *own)
+                yield groups[at], rows_of(piece, arm, drift, *own, settle=settle)
 
     def within(rows: Rows, low: float, high: float) -> ChangeTime | None:
         """The change between `low` and `high` s; None where the rows have not both its sides.
@@ -228,12 +235,12 @@ def confirmed(
         low, high = max(low, float(rows.t[0]) + MARGIN), min(high, float(rows.t[-1]) - MARGIN)
         return place(rows, low, high, variance) if low < middle < high else None
 
-    def shift() -> None:
+    def shift(*, settle: bool = True) -> None:
         """Move each change to where the rows about it have it, which depend on where it was."""
         left = list(range(len(places)))
         for number in range(_MOST_MOVES):
             moved = []
-            for (at, _), rows in rows_about([(at, at) for at in left]):
+            for (at, _), rows in rows_about([(at, at) for at in left], settle=settle):
                 time, (low, high) = places[at].time, places[at].safe
                 reach = REACH if number == 0 else min(REACH, 2 * max(time - low, high - time))
                 places[at] = within(rows, time - reach, time + reach) or places[at]
@@ -268,6 +275,8 @@ def confirmed(
             before, own, after = gains[at : at + 3]
             if own < penalty and own <= min(before, after):
                 del places[at], masses[at + 1]
+    # A trajectory of the fit that holds the masses draws a heavy one's change to where it was.
+    shift(settle=False)
     return places
 
 

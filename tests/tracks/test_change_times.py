@@ -149,3 +149,16 @@ def test_brackets_hold_the_time_of_a_heavy_payload_amid_noisy_angles() -> None:
         )[0]
         ((_, low, high),) = algid.track(log, arm).track.changes
         assert low <= time <= high
+
+
+def test_a_heavy_payload_is_set_down_when_it_was_and_not_when_cells_had_it() -> None:
+    """A trajectory that holds the masses had drawn changes to where cells have them, by 70 ms."""
+    noise: dict[str, Any] = {"position_noise": 1e-3, "torque_noise": 1e-2, "torque": "wide"}
+    arm = algid.identify(
+        *algid.synthesise("case1", duration=4.0, seed=3, **noise), model="plain", report=False
+    )
+    schedule = [(1.2, 0.3), (2.6, 0.0), (4.1, 0.5), (5.5, 0.0)]
+    log = algid.synthesise("case1", duration=7.0, seed=41, payload_schedule=schedule, **noise)[0]
+    changes = algid.track(log, arm).track.changes
+    for (_, low, high), (time, _) in zip(changes, schedule, strict=True):
+        assert low <= time <= high
