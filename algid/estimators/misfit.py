@@ -181,7 +181,7 @@ class Products:
 
     def explained(self, own: NDArray[np.int64], rest: NDArray[np.int64]) -> float:
         """By how much columns `own` lower the squares beside the columns `rest`."""
-        M, b = left_beside(self.total, rest, np.setdiff1d(own, rest))
+        M, b = left_beside(self.total, rest, own[~np.isin(own, rest)])
         return float(b @ scaled_pinv(M) @ b)
 
     def coefficients(self, p: FloatArray) -> At:
