@@ -53,7 +53,9 @@ if TYPE_CHECKING:
 
 ROUNDS = 2  # of linearising each stretch at its own mass and looking for the changes again
 FEWEST = 4  # cells that weigh a stretch
-CALM = 1  # cells more on both sides of the times at which a payload may be changing
+CALM = 2
+"""Cells more on both sides of the times at which a payload may be changing: the trajectory at which
+rows are linearised is smoothed at 40 Hz, which spreads a heavy payload's jolt over 40 ms."""
 LASTING = 2.5  # s: for so long friction that drifts counts as constant where rows are linearised
 LONGEST = 60.0  # s of log that are held at once to be linearised
 HALF_BAND = 0.25  # s: m_p(t) rests on so much log on both sides of t

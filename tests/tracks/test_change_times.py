@@ -159,6 +159,10 @@ def test_a_heavy_payload_is_set_down_when_it_was_and_not_when_cells_had_it() -> 
     )
     schedule = [(1.2, 0.3), (2.6, 0.0), (4.1, 0.5), (5.5, 0.0)]
     log = algid.synthesise("case1", duration=7.0, seed=41, payload_schedule=schedule, **noise)[0]
-    changes = algid.track(log, arm).track.changes
-    for (_, low, high), (time, _) in zip(changes, schedule, strict=True):
+    track = algid.track(log, arm).track
+    for (_, low, high), (time, _) in zip(track.changes, schedule, strict=True):
         assert low <= time <= high
+    # the jolts of changes are in no stretch: one had left 4 times the noise, and 0.494 for 0.5 kg
+    assert track.colour < 2
+    for stretch, mass in zip(track.stretches, (0.0, 0.3, 0.0, 0.5, 0.0), strict=True):
+        assert abs(stretch.m_p - mass) < 3.5 * stretch.std
