@@ -28,6 +28,7 @@ from algid.physics.parameters import BODY, PAYLOAD, Parameter
 from algid.physics.signals import (
     ALPHA,
     MOTION,
+    WIDTHS,
     Motion,
     Product,
     Values,
@@ -268,6 +269,11 @@ def _only(compiled: Compiled, places: frozenset[int]) -> Compiled:
 def terms_named(names: Iterable[str]) -> Iterator[Term]:
     """The terms with these names."""
     return map(EVERY_TERM.__getitem__, names)
+
+
+def widths_in(terms: Iterable[str]) -> tuple[str, ...]:
+    """Widths of friction that shape some of the terms."""
+    return within(WIDTHS, [width for term in terms_named(terms) for width in term.shapes])
 
 
 @lru_cache(maxsize=256)

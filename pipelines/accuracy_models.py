@@ -87,7 +87,7 @@ if __name__ == "__main__":
         "m_p": number("m_p", np.median, 100),
         "Coulomb held": share("f held"),
         "Stribeck held": share("s held"),
-        "farthest, σ": number("s far", np.max),
+        "Stribeck farthest, σ": number("s far", np.max),
         "terms": words("terms"),
     }
     experiment("models", __doc__, rows, draw, columns, draws=4)

@@ -53,6 +53,7 @@ from algid.model import (
     smooth_sign,
     terms_named,
     torque,
+    widths_in,
     without_delay,
 )
 from algid.physics.signals import WIDTHS
@@ -153,11 +154,10 @@ class Products:
         last = {label: place for place, label in enumerate(self._labels)}
         return [last[name] if loaded else place for place, name in enumerate(self.names)]
 
-    def columns(self, terms: Iterable[str]) -> NDArray[np.int64]:
+    def columns(self, terms: Collection[str]) -> NDArray[np.int64]:
         """Places in p of eq. (1), of `terms` and of their widths."""
-        present = tuple(terms_named(terms))
-        shapes = [width for term in present for width in term.shapes]
-        return self._named([*names_of(ALWAYS), *names_of(present), *shapes])
+        present = names_of(terms_named(terms))
+        return self._named([*names_of(ALWAYS), *present, *widths_in(terms)])
 
     def own(self, term: str) -> NDArray[np.int64]:
         """Places in p of the coefficients of one term."""

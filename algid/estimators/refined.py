@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 from functools import cache, reduce
 from itertools import combinations
 from operator import add
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,7 @@ from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem
 from algid.estimators.repeats import Groups, grouped
 from algid.estimators.weak import fit as weak_fit
-from algid.model import TERMS, acting
+from algid.model import acting, widths_in
 from algid.notices import Notice
 from algid.physics.signals import TRIED
 from algid.signals.segments import Segment
@@ -269,15 +269,14 @@ def _settled_widths(
     for a width may be several times the true one. The likelihood may be refuted by that alone.
     The `logs` are those of these widths then.
     """
-    terms = trained.shared.model.terms
-    names = [name for name in TRIED if any(name in TERMS[term].shapes for term in terms)]
+    names = widths_in(trained.shared.model.terms)
     added: FloatArray = np.zeros((trained.beta.size,) * 2)
     if not names:
         return trained, added
 
     def shared_at(widths: FloatArray) -> Shared:
         shared = trained.shared
-        held = dict(zip(names, widths.tolist(), strict=True))
+        held: dict[str, Any] = named_values(names, widths)
         return replace(shared, model=replace(shared.model, **held))
 
     def profile(widths: FloatArray) -> tuple[float, FloatArray]:
@@ -365,8 +364,8 @@ def likeliest_widths(
         value, _ = seen(place)
         return value if np.isfinite(value) else np.inf
 
-    def beside(*sides: NDArray[np.int64]) -> tuple[int, ...]:
-        return tuple(np.add(place, np.sum(sides, axis=0)).tolist())
+    def beside(side: NDArray[np.int64]) -> tuple[int, ...]:
+        return tuple(np.add(place, side).tolist())
 
     place = (0,) * start.size
     for step in (2, 1):
@@ -385,7 +384,7 @@ def likeliest_widths(
     H = np.diag(below - 2 * here + above)
     for i, j in combinations(range(len(free)), 2):
         mixed = sum(
-            a * b * deviance(beside(a * free[i], b * free[j])) for a in (-1, 1) for b in (-1, 1)
+            a * b * deviance(beside(a * free[i] + b * free[j])) for a in (-1, 1) for b in (-1, 1)
         )
         H[i, j] = H[j, i] = 0.25 * mixed if np.isfinite(mixed) else 0.0
     # in shares of what lies between the ends, of which no width is known worse than if all of it

@@ -57,7 +57,7 @@ from algid.model import (
     without_delay,
 )
 from algid.physics.effort import ELASTIC
-from algid.physics.signals import TRIED, WIDTHS
+from algid.physics.signals import TRIED
 from algid.signals.segments import pieces, spread_pieces
 
 CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and not term.lags)
@@ -142,11 +142,6 @@ def has_need(term: str, terms: Collection[str]) -> bool:
 def _using(shape: str) -> tuple[str, ...]:
     """Terms that a width of friction shapes."""
     return tuple(name for name, term in TERMS.items() if shape in term.shapes)
-
-
-def needs_shape(terms: Sequence[str]) -> bool:
-    """Whether some of `terms` have a width that is to be found."""
-    return any(not set(_using(width)).isdisjoint(terms) for width in WIDTHS)
 
 
 _Piece = tuple[Source, dict[Hashable, Known]]

@@ -22,7 +22,6 @@ from algid.estimators.terms import (
     CHOICE,
     Selection,
     TermTrial,
-    needs_shape,
     revised,
     select,
 )
@@ -37,6 +36,7 @@ from algid.model import (
     FIRST_TERMS,
     TERMS,
     Model,
+    widths_in,
     without_delay,
 )
 from algid.notices import Notice
@@ -87,7 +87,7 @@ def choose_model(
         model = replace(model_of(earlier), gravity=settings.gravity)
         chosen = _given(model, model.terms + within(DELAYS, earlier.parameters))
         chosen = replace(chosen, chosen_by="parameters")
-    elif not (settings.chooses or by_logs or needs_shape(settings.terms)):
+    elif not (settings.chooses or by_logs or widths_in(settings.terms)):
         chosen = _given(Model(gravity=settings.gravity), settings.terms)
     else:
         with long_enough(survey):

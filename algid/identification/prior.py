@@ -46,7 +46,7 @@ from algid.arm import CONSTANT_NAMES, Arm, FloatArray
 from algid.base.criteria import SAME_LENGTH, STILL
 from algid.base.errors import ResultError, SettingError
 from algid.base.files import read_text
-from algid.base.names import outside, places_outside, vector, within
+from algid.base.names import named_values, outside, places_outside, vector, within
 from algid.base.significance import LEVEL, chance
 from algid.base.text import counted
 from algid.estimators.combine import likelihood, scaled_pinv
@@ -240,7 +240,7 @@ def read_urdf(path: Path, profile: Profile | None = None) -> Predictor:
     terms = ("coulomb",) * any(friction) + ("phases",) * bent
     model = Model(terms, gravity=arm.g)
     numbers = np.concatenate([arm.constants(), arm.sines(), friction])
-    value = dict(zip((*CONSTANT_NAMES, *SINES, F1, F2), numbers.tolist(), strict=True))
+    value = named_values((*CONSTANT_NAMES, *SINES, F1, F2), numbers)
     c = vector(model.names, value | dict.fromkeys(absent(profile.effort, model.names), 0.0))
 
     def coefficients(role: Role) -> FloatArray:
