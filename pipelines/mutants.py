@@ -22,8 +22,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from libcst import MetadataWrapper, Module, parse_module
-from libcst.metadata import PositionProvider
+from libcst import Arg, MetadataWrapper, Module, parse_module
+from libcst.metadata import ParentNodeProvider, PositionProvider
 from mutmut.mutation.file_mutation import Mutation, MutationVisitor
 from mutmut.mutation.mutators import mutation_operators
 from mutmut.mutation.pragma_handling import IgnoredCode
@@ -95,13 +95,16 @@ class Mutant:
 
 
 def mutants(path: Path) -> Iterator[Mutant]:
-    """All mutants of a file's functions."""
+    """All mutants of a file's functions, save those without `zip`'s own check of lengths."""
     wrapper = MetadataWrapper(parse_module(path.read_text(encoding="utf-8")))
     positions = wrapper.resolve(PositionProvider)
+    parents = wrapper.resolve(ParentNodeProvider)
     visitor = MutationVisitor(mutation_operators, IgnoredCode(set(), set(), set()))
     module = wrapper.visit(visitor)
     for number, change in enumerate(visitor.mutations):
-        if change.contained_by_top_level_function is not None:
+        parent = parents[change.original_node]
+        checks = isinstance(parent, Arg) and parent.keyword and parent.keyword.value == "strict"
+        if change.contained_by_top_level_function is not None and not checks:
             place = positions[change.original_node]
             lines = range(place.start.line, place.end.line + 1)
             yield Mutant(path, lines, f"{path}:{lines[0]}:{number}", module, change)
