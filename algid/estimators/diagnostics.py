@@ -112,7 +112,7 @@ def broken_bounds(fit: Fit) -> list[BrokenBound]:
     A parameter that the logs leave open breaks none, nor does a term that is shrunk: it takes up
     what the model lacks.
     """
-    known = fit.determined.difference(() if fit.shrinkage is None else fit.shrinkage.names)
+    known = fit.determined.difference(fit.shrunk)
     open_ones = {f"{name} >= 0" for name in outside(fit.names, known)}
     if {K1, K2} & set(fit.absent):
         open_ones.add("k1 k2 >= 0")

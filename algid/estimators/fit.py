@@ -125,6 +125,11 @@ class Fit:
         return self.prior.absent
 
     @property
+    def shrunk(self) -> tuple[str, ...]:
+        """Parameters of the torque's terms that a prior holds where the logs do not."""
+        return () if self.shrinkage is None else self.shrinkage.names
+
+    @property
     def by_name(self) -> dict[str, tuple[float, float]]:
         """Value and standard deviation of each parameter."""
         pairs = zip(self.values.tolist(), self.std.tolist(), strict=True)
@@ -421,8 +426,14 @@ def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> dic
     are wider than the information of all logs has it: that of coloured residuals and of what
     differs from run to run.
     """
-    _, plain = _estimate(fit, fit.logs)
-    known = np.isfinite(fit.std) & (plain > 0)
+
+    def by_information(logs: Sequence[LogInformation]) -> Fit:
+        """What some of the logs tell, by their information alone."""
+        start = fit.shared, logs, fit.values, fit.moved, fit.prior
+        return finish(fit.estimator, *start, coloured=False)
+
+    plain = by_information(fit.logs).std
+    known = np.isfinite(fit.std + plain) & (plain > 0)
     widening = np.divide(fit.std, plain, out=np.ones_like(plain), where=known)
     places, times, rows = [], [], []
     for number, log in enumerate(fit.logs):
@@ -431,28 +442,16 @@ def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> dic
         ends = np.unique(np.linspace(0, len(S), count + 1).astype(int))[1:]
         for end in ends:
             own = replace(log, S=S[end - 1 : end], g=g[end - 1 : end])
-            beta, std = _estimate(fit, [*fit.logs[:number], own])
+            found = by_information([*fit.logs[:number], own])
             places.append(number)
             times.append(durations[number] * end / len(S))
-            rows.append(np.concatenate([beta, fit.quantile * widening * std]))
+            # the fit may know better than its sums
+            determined = np.isfinite(found.std + fit.std)
+            row = np.stack([found.values, fit.quantile * widening * found.std])
+            rows.append(np.where(determined, row, np.nan).ravel())
     names = (*fit.names, *(f"{name}_half" for name in fit.names))
     columns = {"log": np.array(places, dtype=np.int32), "t": np.array(times)}
     return columns | dict(zip(names, np.transpose(rows), strict=True))
-
-
-def _estimate(fit: Fit, logs: Sequence[LogInformation]) -> tuple[FloatArray, FloatArray]:
-    """Parameters (Q,) by some of the fit's logs, and their standard deviations (Q,).
-
-    NaN where they are open.
-    """
-    beta, S, _ = combine(fit.shared, logs, fit.values, fit.prior)
-    if not S.any():  # a joint at rest, and nothing else so far
-        return np.full(beta.shape, np.nan), np.full(beta.shape, np.nan)
-    known = examine(fit.names, beta, S, fit.moved, fit.absent)
-    std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
-    # the fit may know better than its sums
-    determined = np.array(known.determined) & np.isfinite(fit.std)
-    return np.where(determined, beta, np.nan), np.where(determined, std, np.nan)
 
 
 def has_running(fit: Fit) -> bool:

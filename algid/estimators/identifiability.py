@@ -72,27 +72,19 @@ def examine(
         A parameter is open that has a share of `SHARE` or more in an open direction. The
         covariance is the inverse of S, as wide along open directions as S has it.
     """
-    free = places_outside(names, bounded)
-    if len(free) < len(names):
-        marginal = scaled_pinv(scaled_pinv(S)[np.ix_(free, free)])
-        of_free = examine(outside(names, bounded), values[free], marginal, moved)
-        covariance, known = np.zeros_like(S), np.ones(len(names), dtype=bool)
-        covariance[np.ix_(free, free)], known[free] = of_free.covariance, of_free.determined
-        return Identifiability(of_free.left_open, tuple(known.tolist()), covariance)
-    size = sizes(names, values)
-    eigenvalues, vectors, lost = _spectrum(S, size)
+    free, size, eigenvalues, vectors, lost = _spectrum(names, values, S, bounded)
     null = vectors[:, lost]
-    part = np.sqrt(np.sum(null**2, axis=1))
-    determined = tuple((part < SHARE).tolist())
+    determined, covariance = np.ones(len(names), dtype=bool), np.zeros_like(S)
+    determined[free] = np.sqrt(np.sum(null**2, axis=1)) < SHARE
     # A direction of little information is as wide here as it is: what it mixes with is as unsure.
     inverse = (vectors / np.maximum(eigenvalues, _NOTHING * eigenvalues[-1] + 1e-300)) @ vectors.T
-    return Identifiability(
-        tuple(_left_open(names, null, size, moved)), determined, inverse * np.outer(size, size)
-    )
+    covariance[np.ix_(free, free)] = inverse * np.outer(size, size)
+    left_open = tuple(_left_open(outside(names, bounded), null, size, moved))
+    return Identifiability(left_open, tuple(determined.tolist()), covariance)
 
 
 def open_directions(
-    names: Sequence[str], values: FloatArray, S: FloatArray
+    names: Sequence[str], values: FloatArray, S: FloatArray, bounded: Collection[str] = ()
 ) -> tuple[FloatArray, FloatArray]:
     """Directions that the information S (Q, Q) on parameters `values` (Q,) leaves open.
 
@@ -100,18 +92,28 @@ def open_directions(
     -------
     null : (Q, m), orthonormal, of the parameters over their sizes
     size : (Q,)
+        Both of those parameters alone that are not `bounded`.
     """
-    size = sizes(names, values)
-    _, vectors, lost = _spectrum(S, size)
+    _, size, _, vectors, lost = _spectrum(names, values, S, bounded)
     return vectors[:, lost], size
 
 
-def _spectrum(S: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Eigenvalues and vectors of the information scaled by the sizes, and which count as zero."""
+def _spectrum(
+    names: Sequence[str], values: FloatArray, S: FloatArray, bounded: Collection[str]
+) -> tuple[list[int], FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Places and sizes of the parameters that are not `bounded`.
+
+    With them eigenvalues and vectors of what the others leave of the information, scaled by the
+    sizes, and which count as zero.
+    """
+    free = places_outside(names, bounded)
+    if len(free) < len(names):
+        S = scaled_pinv(scaled_pinv(S)[np.ix_(free, free)])
+    size = sizes(outside(names, bounded), values[free])
     scaled = S * np.outer(size, size)
     eigenvalues, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
     least = max(1 / UNDETERMINED**2, _NOTHING * eigenvalues[-1])
-    return eigenvalues, vectors, eigenvalues < least
+    return free, size, eigenvalues, vectors, eigenvalues < least
 
 
 def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
@@ -167,17 +169,11 @@ def _left_open(
             yield Notice("OPEN_DIRECTION", numbers=numbers | {"why": why})
 
 
-def _groups(null: FloatArray) -> list[list[int]]:
+def _groups(null: FloatArray) -> list[NDArray[np.int64]]:
     """Rows that share an undetermined direction."""
-    projector = null @ null.T
-    rest = np.flatnonzero(np.sqrt(np.diag(projector)) >= SHARE).tolist()
-    groups: list[list[int]] = []
-    while rest:
-        group = [rest.pop(0)]
-        for row in group:  # which grows as rows that are linked to it are found
-            linked = [other for other in rest if abs(projector[row, other]) >= SHARE**2]
-            for other in linked:
-                rest.remove(other)
-            group += linked
-        groups.append(sorted(group))
-    return groups
+    projector = np.abs(null @ null.T)
+    rows = np.flatnonzero(np.sqrt(np.diag(projector)) >= SHARE)
+    linked = projector[np.ix_(rows, rows)] >= SHARE**2
+    # along chains of links, as many as there may be
+    reached = np.linalg.matrix_power(linked.astype(np.float64), len(rows)) > 0
+    return [rows[list(group)] for group in dict.fromkeys(map(tuple, reached.tolist()))]

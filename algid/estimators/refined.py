@@ -354,37 +354,39 @@ def likeliest_widths(
     along = np.eye(start.size, dtype=np.int64)
 
     @cache
-    def seen(place: tuple[int, ...]) -> tuple[float, FloatArray]:
-        """By half octaves from the first widths."""
-        x = first + np.multiply(place, h)
-        inside = np.all((low <= x) & (x <= high))
-        return profile(np.exp(x)) if inside else (np.inf, np.empty(0))
+    def seen(*steps: int) -> FloatArray:
+        x = first + h * np.array(steps)
+        if np.any((x < low) | (high < x)):
+            return np.array([np.inf])
+        value, beta = profile(np.exp(x))
+        return np.append(value if np.isfinite(value) else np.inf, beta)
 
-    def deviance(place: tuple[int, ...]) -> float:
-        value, _ = seen(place)
-        return value if np.isfinite(value) else np.inf
+    def at(place: NDArray[np.int64]) -> FloatArray:
+        """The deviance and the best parameters so many half octaves from the first widths."""
+        return seen(*place.tolist())
 
-    def beside(side: NDArray[np.int64]) -> tuple[int, ...]:
-        return tuple(np.add(place, side).tolist())
+    def deviance(place: NDArray[np.int64]) -> float:
+        return float(at(place)[0])
 
-    place = (0,) * start.size
+    place = 0 * along[0]
     for step in (2, 1):
         while True:
-            around = [beside(side * step * one) for one in along for side in (-1, 1)]
+            around = (place + side * step * one for one in along for side in (-1, 1))
             best = min(around, key=deviance)
             if deviance(best) >= deviance(place):
                 break
             place = best
-    x, here = first + np.multiply(place, h), deviance(place)
+    x, here = first + h * place, at(place)
     # a width at an end of its range is taken for known
-    free = [one for one in along if np.isfinite(deviance(beside(one)) + deviance(beside(-one)))]
-    if not (free and np.isfinite(here)):
-        return np.exp(x), np.zeros((seen(place)[1].size,) * 2)
-    below, above = np.array([[deviance(beside(side * one)) for one in free] for side in (-1, 1)])
-    H = np.diag(below - 2 * here + above)
+    free = [one for one in along if np.isfinite(deviance(place + one) + deviance(place - one))]
+    if not (free and np.isfinite(here[0])):
+        return np.exp(x), np.zeros((here.size - 1,) * 2)
+    below, above = np.array([[at(place + side * one) for one in free] for side in (-1, 1)])
+    slope = 0.5 * (above - below)
+    H = np.diag((below - 2 * here + above)[:, 0])
     for i, j in combinations(range(len(free)), 2):
         mixed = sum(
-            a * b * deviance(beside(a * free[i] + b * free[j])) for a in (-1, 1) for b in (-1, 1)
+            a * b * deviance(place + a * free[i] + b * free[j]) for a in (-1, 1) for b in (-1, 1)
         )
         H[i, j] = H[j, i] = 0.25 * mixed if np.isfinite(mixed) else 0.0
     # in shares of what lies between the ends, of which no width is known worse than if all of it
@@ -392,8 +394,7 @@ def likeliest_widths(
     span = np.array(free) @ ((high - low) / h)
     curvature, axes = np.linalg.eigh(H * np.outer(span, span))
     curvature, to = np.maximum(curvature, 1e-300), axes * span[:, None]
-    offset = np.transpose(free) @ (to @ (to.T @ (0.5 * (below - above)) / curvature))
-    changes = [(seen(beside(one))[1] - seen(beside(-one))[1]) / 2 for one in free]
-    moved = to.T @ np.array(changes)
+    offset = np.transpose(free) @ (to @ (to.T @ -slope[:, 0] / curvature))
+    moved = to.T @ slope[:, 1:]
     variance = np.minimum(2.0 / curvature, 1 / 12)
     return np.exp(x + h * np.clip(offset, -1, 1)), (moved.T * variance) @ moved

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,11 @@ def shared_samples(logs: Sequence[FloatArray]) -> FloatArray:
     """
     every, shares = np.concatenate(logs, axis=1), np.zeros((len(logs), len(logs)))
     ends = np.cumsum([log.shape[1] for log in logs])
-    sorting: dict[int, NDArray[np.int64]] = {}
+
+    @cache
+    def sorting(row: int) -> NDArray[np.int64]:
+        return np.argsort(every[row])
+
     for own, log in enumerate(logs):
         if log.shape[1] < _RUN:
             continue
@@ -76,11 +81,9 @@ def shared_samples(logs: Sequence[FloatArray]) -> FloatArray:
             row = int(np.argmax(np.minimum(counts, _RUN // 2)))
             if counts[row] < _DIFFERENT:
                 continue
-            if row not in sorting:
-                sorting[row] = np.argsort(every[row])
             bounds = run[row, 0] + error[row] * (-1, 1)
-            first, last = np.searchsorted(every[row], bounds, sorter=sorting[row])
-            found = sorting[row][first:last]
+            first, last = np.searchsorted(every[row], bounds, sorter=sorting(row))
+            found = sorting(row)[first:last]
             found = found[found <= every.shape[1] - _RUN]
             found = found[np.all(np.abs(every[:, found] - run[:, :1]) <= error, axis=0)]
             there = every[:, found[:, None] + np.arange(_RUN)]

@@ -194,10 +194,8 @@ def fit_summary(found: Fitted) -> results.FitSummary:
     if (scatter := repeatability(fit)) is not None:
         masses, std, ci95 = scatter
         repeated = results.Repeatability(masses=masses.tolist(), std=std, ci95=ci95)
-    expected: tuple[str, ...] = ()  # each is what the logs and a prior agree on
-    if fit.shrinkage is not None:
-        expected = fit.shrinkage.names
-    elif chosen.undetermined is not None:
+    expected = fit.shrunk  # each is what the logs and a prior agree on
+    if chosen.undetermined is not None:
         expected = within(DELAYS, fit.names)
     gain, known = None, settings.payload_mass
     if known is not None and "m_p" in fit.names:

@@ -189,12 +189,9 @@ def _determined(fit: Fit, places: list[int], doubtful: list[bool]) -> FloatArray
     They hold nothing of those that are `doubtful`.
     """
     information = likelihood(fit.shared, fit.logs, fit.values, fit.prior)[2]
-    bounded = fit.absent + (() if fit.shrinkage is None else fit.shrinkage.names)
-    free = places_outside(fit.names, bounded)
-    if bounded:
-        information = scaled_pinv(scaled_pinv(information)[np.ix_(free, free)])
-    null, size = open_directions(outside(fit.names, bounded), fit.values[free], information)
-    own = [free.index(place) for place in places]
+    bounded = fit.absent + fit.shrunk
+    null, size = open_directions(fit.names, fit.values, information, bounded)
+    own = list(map(places_outside(fit.names, bounded).index, places))
     lost, share, _ = np.linalg.svd(np.hstack([null[own], np.diag(np.array(doubtful, float))]))
     return lost[:, np.count_nonzero(share > SHARE) :] / size[own][:, None]
 
