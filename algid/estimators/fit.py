@@ -272,8 +272,8 @@ def finish(
     """
     beta, S, _ = combine(shared, logs, beta, prior)
     bounded = (prior.absent if prior else ()) + (shrinkage.names if shrinkage else ())
-    known = examine(shared.names, beta, S, moved, bounded)
-    covariance, quantile, freedom = known.covariance, NORMAL, samples
+    left_open, white, lacking = examine(shared.names, beta, S, moved, bounded)
+    covariance, quantile, freedom = white, NORMAL, samples
     intervals: Intervals = "likelihood"
     if coloured:
         each = merged(logs, repeats) if repeats else logs
@@ -283,7 +283,7 @@ def finish(
         intervals = "jackknife" if repeated else "sandwich"
         kinds, (_, _, before) = scatters(shared, each, beta), likelihood(shared, (), beta, prior)
         meat, freedom = sandwich(kinds)
-        inverse = scaled_pinv(S) if shrinkage else known.covariance
+        inverse = scaled_pinv(S) if shrinkage else white
         of_prior, covariance = inverse @ before @ inverse, inverse @ (meat + before) @ inverse
         if shrinkage:
             among = np.sum([kind.among(_PRIOR_LOGS) for kind in kinds], axis=0)
@@ -293,7 +293,7 @@ def finish(
         else:
             if estimator == "refined":
                 # The long-run variance of a short log errs low: white noise is the least there is.
-                covariance = widened(covariance, known.covariance)
+                covariance = widened(covariance, white)
             within = covariance
             for one in repeated:
                 covariance = widened(covariance, one)
@@ -306,8 +306,8 @@ def finish(
         intervals=intervals,
         quantile=quantile,
         freedom=freedom,
-        status=tuple("OK" if determined else "NOT_IDENTIFIABLE" for determined in known.determined),
-        unidentifiable=known.left_open,
+        status=tuple("NOT_IDENTIFIABLE" if lost else "OK" for lost in lacking),
+        unidentifiable=left_open,
         logs=tuple(logs),
         prior=prior,
         moved=moved,

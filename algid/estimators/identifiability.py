@@ -15,19 +15,18 @@ null    directions over the sizes that S leaves open         (Q, m)           1
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.base.criteria import STILL, UNDETERMINED
-from algid.base.names import outside, places_outside
+from algid.base.names import named_values, outside, places_outside, within
 from algid.estimators.combine import scaled_pinv
 from algid.model import PARAMETERS, RIGID
 from algid.notices import Notice
-from algid.physics.parameters import INERTIA, LENGTH, MASS, MOMENT, VISCOUS
+from algid.physics.parameters import INERTIA, LENGTH, MASS, MOMENT, VISCOUS, Scale
 
 # of √(inertia × gravity), half the critical damping: an arm may be free of friction, and that be
 # known
@@ -37,22 +36,13 @@ SHARE = 0.15
 """Of an eigenvector: below it a parameter has no part in the direction."""
 
 
-@dataclass(frozen=True, eq=False)
-class Identifiability:
-    """Undetermined directions in words, which parameters are determined, and their covariance."""
-
-    left_open: tuple[Notice, ...]
-    determined: tuple[bool, ...]
-    covariance: FloatArray
-
-
 def examine(
     names: Sequence[str],
     values: FloatArray,
     S: FloatArray,
     moved: FloatArray,
     bounded: Collection[str] = (),
-) -> Identifiability:
+) -> tuple[tuple[Notice, ...], FloatArray, NDArray[np.bool_]]:
     """Which parameters and combinations the information determines.
 
     Parameters
@@ -68,19 +58,18 @@ def examine(
 
     Returns
     -------
-    Identifiability
-        A parameter is open that has a share of `SHARE` or more in an open direction. The
-        covariance is the inverse of S, as wide along open directions as S has it.
+    Undetermined directions in words, the covariance (Q, Q), and which parameters (Q,) are open:
+    those that have a share of `SHARE` or more in an open direction. The covariance is the inverse
+    of S, as wide along open directions as S has it.
     """
     free, size, eigenvalues, vectors, lost = _spectrum(names, values, S, bounded)
     null = vectors[:, lost]
-    determined, covariance = np.ones(len(names), dtype=bool), np.zeros_like(S)
-    determined[free] = np.sqrt(np.sum(null**2, axis=1)) < SHARE
+    lacking, covariance = np.zeros(len(names), dtype=bool), np.zeros_like(S)
+    lacking[free] = np.sqrt(np.sum(null**2, axis=1)) >= SHARE
     # A direction of little information is as wide here as it is: what it mixes with is as unsure.
     inverse = (vectors / np.maximum(eigenvalues, _NOTHING * eigenvalues[-1] + 1e-300)) @ vectors.T
     covariance[np.ix_(free, free)] = inverse * np.outer(size, size)
-    left_open = tuple(_left_open(outside(names, bounded), null, size, moved))
-    return Identifiability(left_open, tuple(determined.tolist()), covariance)
+    return tuple(_left_open(outside(names, bounded), null, size, moved)), covariance, lacking
 
 
 def open_directions(
@@ -122,19 +111,23 @@ def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
     That of viscous friction is a share of critical damping.
     """
     scales = [PARAMETERS[name].scale for name in names]
-    sized = dict.fromkeys(scales + [VISCOUS], 0.0)
-    arm = {INERTIA: 0.0, MOMENT: 0.0}  # the largest of its own
-    for name, scale, value in zip(names, scales, np.abs(values).tolist(), strict=True):
-        sized[scale] = max(sized[scale], value)
-        if name in RIGID:
-            arm[scale] = max(arm[scale], value)
-    inertia, moment = arm.values()
+    value_of = named_values(names, np.abs(values))
+
+    def largest(scale: Scale, among: Iterable[str]) -> float:
+        return max(
+            (value_of[name] for name in among if PARAMETERS[name].scale == scale), default=0.0
+        )
+
+    arm = within(RIGID, names)
+    inertia, moment = largest(INERTIA, arm), largest(MOMENT, arm)
+    least = {VISCOUS: _DAMPING * float(np.sqrt(inertia * moment))}
     # With both lengths known the torque is linear in the payload, which may be none, and that be
     # known: its size is that of a mass which at 1 m loads the arm as much as it loads itself.
-    if MASS in scales and LENGTH not in scales:
-        sized[MASS] = max(sized[MASS], moment / 9.81, inertia)
-    sized[VISCOUS] = max(sized[VISCOUS], _DAMPING * float(np.sqrt(inertia * moment)))
-    return np.array([max(sized[scale], scale.least) for scale in scales])
+    if LENGTH not in scales:
+        least[MASS] = max(moment / 9.81, inertia)
+    return np.array(
+        [max(largest(scale, names), least.get(scale, 0.0), scale.least) for scale in scales]
+    )
 
 
 def _left_open(

@@ -23,7 +23,8 @@ y       angles at the horizons; NaN past a stretch's end                (H, 2, S
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -33,7 +34,7 @@ from algid.estimators.elastic import flexed
 from algid.estimators.fit import Fit
 from algid.estimators.problem import Source
 from algid.model import F1, F2, Model, Motion, advanced, inertia, partials, regressor
-from algid.signals.differences import AT_ONCE, TorqueShift
+from algid.signals.differences import AT_ONCE, TorqueShift, weighted
 from algid.signals.filters import butterworth, correlate, smoother
 from algid.signals.segments import Segment, pieces
 
@@ -53,72 +54,15 @@ FILTER = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class PredictionScore:
-    """Samples, and sums (9, 2) over them by joint.
-
-    Of the torque; of squares of torque, of the model's parts and of the residual; then samples and
-    squares of the residual of joints that move, the same of those that stand, and d²: `sums_of`.
-    """
-
-    count: float = 0.0
-    sums: FloatArray = field(default_factory=lambda: np.zeros((9, 2)))
-
-    def __add__(self, other: PredictionScore) -> PredictionScore:
-        return PredictionScore(self.count + other.count, self.sums + other.sums)
-
-    @property
-    def rmse(self) -> FloatArray:
-        """Root mean square of the residual (2,) in N m."""
-        return np.sqrt(self.sums[3] / max(self.count, 1.0))
-
-    @property
-    def nrmse(self) -> FloatArray:
-        """RMSE over the torque's root mean square (2,).
-
-        Of a joint without torque over the other joint's.
-        """
-        return self._beside(self._of_drive(self.sums[1]))
-
-    @property
-    def of_load(self) -> FloatArray:
-        """RMSE over the RMS (2,) of the torque, or of the model's parts where that is larger.
-
-        A joint that is hardly driven has little torque, since inertia, weight and friction make up
-        for one another there.
-        """
-        return self._beside(np.maximum(self._of_drive(self.sums[1]), self.sums[2]))
-
-    def _beside(self, squares: FloatArray) -> FloatArray:
-        return np.sqrt(self.sums[3] / np.maximum(squares, 1e-300))
-
-    @property
-    def r2(self) -> FloatArray:
-        """Share of the torque's variance that is predicted (2,).
-
-        Of a joint without torque, of the other joint's.
-        """
-        spread = self.sums[1] - self.sums[0] ** 2 / max(self.count, 1.0)
-        return 1 - self.sums[3] / np.maximum(self._of_drive(spread), 1e-300)
-
-    @property
-    def by_state(self) -> FloatArray:
-        """RMSE (3, 2) in N m of joints that move, of ones that stand, and of these past friction.
-
-        NaN where it never does.
-        """
-        count = self.sums[[4, 6, 6]]
-        return np.sqrt(
-            np.divide(self.sums[[5, 7, 8]], count, out=np.full((3, 2), np.nan), where=count > 0)
-        )
-
-    def _of_drive(self, power: FloatArray) -> FloatArray:
-        """`power` (2,), of a joint without a motor that of the one that drives the arm."""
-        return np.where(self.sums[1] > 0, power, power[::-1])
+NOTHING = np.zeros((9, 2))
+"""What `score` gives of a log that is too short."""
 
 
 def sums_of(model: Model, c: FloatArray, X: FloatArray, omega: FloatArray) -> FloatArray:
-    """Sums (9, 2) over n samples by joint, as `PredictionScore` holds them.
+    """Sums (9, 2) over n samples by joint.
+
+    Of the torque; of squares of torque, of the model's parts and of the residual; then samples and
+    squares of the residual of joints that move, the same of those that stand, and d².
 
     Where a joint stands, dry friction is any torque up to ± f: no model predicts which. Of a joint
     slower than friction's step ω_s is therefore stated, beside the residual r, how far the torque
@@ -207,8 +151,7 @@ def motion_of(theta: FloatArray, dt: float) -> Motion:
     theta = butterworth(theta, dt, min(MOTION, 0.45 / dt))
     rates = []
     for weights in (_SLOPE / dt, _BEND / dt**2):
-        inner = [np.correlate(angle, weights) for angle in theta]
-        rates.append(np.pad(inner, ((0, 0), (2, 2)), mode="edge"))
+        rates.append(np.pad(weighted(theta, weights), ((0, 0), (2, 2)), mode="edge"))
     return Motion(theta, *rates)
 
 
@@ -217,13 +160,10 @@ def score(
     c: FloatArray,
     segments: Iterable[Segment],
     shift: TorqueShift = AT_ONCE,
-) -> PredictionScore:
-    """How well the coefficients `c` (q,) predict a log's torque; see the module."""
-    every = [
-        PredictionScore(float(piece.t.size), sums_of(model, c, piece.X, piece.omega))
-        for piece in scored_torque(model, c, segments, shift)
-    ]
-    return sum(every, PredictionScore())
+) -> FloatArray:
+    """How well the coefficients `c` (q,) predict a log's torque, as `sums_of`; see the module."""
+    every = scored_torque(model, c, segments, shift)
+    return sum((sums_of(model, c, piece.X, piece.omega) for piece in every), NOTHING)
 
 
 def cross_validate(
@@ -231,7 +171,7 @@ def cross_validate(
     unloaded: Sequence[Source],
     loaded: Sequence[Source] = (),
     shift: TorqueShift = AT_ONCE,
-) -> PredictionScore | None:
+) -> FloatArray | None:
     """Score of each log predicted from all the others; None where a kind of log has only one.
 
     The other logs' parameters follow from their quadratic likelihoods, without a further pass;
@@ -241,13 +181,12 @@ def cross_validate(
     sources = list(unloaded) + list(loaded)
     if len(sources) != len(fit.logs) or len(unloaded) == 1 or len(loaded) == 1:
         return None
-    total = PredictionScore()
-    columns = len(fit.shared.model.names)
+    total, columns = NOTHING, len(fit.shared.model.names)
     without = left_out(fit.shared, fit.logs, fit.values, fit.prior)
     for source, log, beta in zip(sources, fit.logs, without, strict=True):
         c = fit.shared.coefficients(beta, log.loaded)
         delay = float(c[columns:].sum())
-        total += score(fit.shared.model, c[:columns], source(), shift.later(delay))
+        total = total + score(fit.shared.model, c[:columns], source(), shift.later(delay))
     return total
 
 
@@ -259,59 +198,37 @@ _POSES = 8  # of joint 2, at which the arm's stiffness is looked at
 _LONGEST, _SHORTEST = 2e-3, 1.25e-4  # s of a step
 
 
-@dataclass(frozen=True, eq=False)
-class RolloutScore:
-    """By horizon (H,): starts.
-
-    Squares (2, H, 2) in rad², by horizon and joint: of errors, and of distances moved.
-    """
-
-    count: FloatArray = field(default_factory=lambda: np.zeros(len(HORIZONS)))
-    squares: FloatArray = field(default_factory=lambda: np.zeros((2, len(HORIZONS), 2)))
-
-    def __add__(self, other: RolloutScore) -> RolloutScore:
-        return RolloutScore(self.count + other.count, self.squares + other.squares)
-
-    @property
-    def rmse(self) -> FloatArray:
-        """RMSE (H, 2) of the angles in rad.
-
-        NaN without a start, infinite where the simulation runs away.
-        """
-        return self._root_mean()[0]
-
-    @property
-    def distance(self) -> FloatArray:
-        """RMS (H, 2) in rad of the joints' travel: the RMSE of an arm that stays where it is."""
-        return self._root_mean()[1]
-
-    def _root_mean(self) -> FloatArray:
-        mean = self.squares / np.maximum(self.count, 1)[:, None]
-        return np.sqrt(np.where(self.count[:, None] > 0, mean, np.nan))
-
-
 def rollouts(
     model: Model,
     c: FloatArray,
     segments: Iterable[Segment],
     duration: float,
     shift: TorqueShift = AT_ONCE,
-) -> RolloutScore:
+) -> FloatArray:
     """Simulate forward from states of a log of `duration` s by the coefficients `c` (q,).
 
     `shift` is the time in s after which a logged torque acts, as for `scored_torque`.
+
+    Returns
+    -------
+    Sums (3, H, 2) over the starts by horizon and joint: their number, and in rad² squares of errors
+    and of distances moved. Infinite where the simulation runs away.
     """
     step = time_step(model, c)
     made = list(_starts(segments, max(_CLOSEST, duration / _STARTS), step, shift, model.lag(c)))
     if not made:
-        return RolloutScore()
+        return np.zeros((3, len(HORIZONS), 2))
     x, u, y = (np.concatenate(parts, axis=-1) for parts in zip(*made, strict=True))
-    judged = np.isfinite(y)
-    with np.errstate(over="ignore", invalid="ignore"):
-        off = np.stack([_angles_at_horizons(model, c, x, u, step) - y, y - x[:2]])
-        # an angle that is no number has run away
+    judged, angles, state = np.isfinite(y), [], x
+    # an arm far from the log's may run away: its error is infinite then
+    with np.errstate(all="ignore"):
+        for first, horizon in pairwise((0.0, *HORIZONS)):
+            for number in range(round(first / step), round(horizon / step)):
+                state = advanced(model, c, state, u[2 * number : 2 * number + 3], step)
+            angles.append(state[:2])
+        off = np.stack([np.stack(angles) - y, y - x[:2]])
         squares = np.where(judged, np.where(np.isnan(off), np.inf, off) ** 2, 0.0)
-    return RolloutScore(judged[:, 0].sum(axis=1).astype(np.float64), squares.sum(axis=3))
+    return np.concatenate([judged[None], squares]).sum(axis=3)
 
 
 def time_step(model: Model, c: FloatArray) -> float:
@@ -350,18 +267,3 @@ def _starts(
         y = np.stack([np.interp(ahead, t, theta) for theta in motion.theta], axis=1)
         y = np.where(ahead[:, None] > n - 1 - edge, np.nan, y)
         yield np.concatenate([motion.theta[:, at], motion.omega[:, at]]), u, y
-
-
-def _angles_at_horizons(
-    model: Model, c: FloatArray, x: FloatArray, u: FloatArray, step: float
-) -> FloatArray:
-    """Angles (H, 2, S) at each horizon, by the classical Runge-Kutta method of fourth order."""
-    angles: list[FloatArray] = []
-    ends = [round(horizon / step) for horizon in HORIZONS]
-    # an arm far from the log's may run away: its error is infinite then
-    with np.errstate(all="ignore"):
-        for number in range(ends[-1]):
-            x = advanced(model, c, x, u[2 * number : 2 * number + 3], step)
-            if number + 1 in ends:
-                angles.append(x[:2])
-    return np.stack(angles)

@@ -48,14 +48,13 @@ from algid.estimators.diagnostics import (
     undriven,
 )
 from algid.estimators.fit import Fit, alone
-from algid.estimators.prediction import PredictionScore
 from algid.estimators.robust import unshrunk
 from algid.identification.by_likelihood import Fitted, finished
 from algid.identification.known import FAR, contradicting, gain_notes
 from algid.identification.passes import problem_of
 from algid.identification.recordings import Recording
 from algid.identification.series import predictor_of_fit
-from algid.identification.validate import prediction, scores
+from algid.identification.validate import predicted_by
 from algid.model import (
     EVERY_TERM,
     FIRST_TERMS,
@@ -138,8 +137,7 @@ def _of_refuted(found: Fitted) -> Iterator[Notice]:
     lawful = constrained(fit)
     if not lawful.converged:
         return
-    total = sum(scores(predictor_of_fit(replace(found, fit=lawful)), survey), PredictionScore())
-    predicted = prediction(total)
+    predicted = predicted_by(predictor_of_fit(replace(found, fit=lawful)), survey)
     if predicted is None or not predicted.unexplained(MOST):
         yield Notice("HARDLY_DRIVEN", numbers={"case": "bounds", "bounds": far})
 

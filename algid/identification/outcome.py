@@ -16,14 +16,14 @@ from algid.base.significance import chance, level
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, repeatability, term_worths
 from algid.estimators.fit import Fit
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
-from algid.estimators.prediction import PredictionScore, cross_validate
+from algid.estimators.prediction import cross_validate
 from algid.estimators.terms import Selection
 from algid.identification.by_likelihood import Fitted
 from algid.identification.checks import fit_notes, remarks
 from algid.identification.known import FAR
 from algid.identification.recordings import Recordings
 from algid.identification.series import predictor_of_fit
-from algid.identification.validate import prediction, scores
+from algid.identification.validate import predicted_by, prediction
 from algid.model import DELAYS, K4, SINE_OF, UNITS, acting
 from algid.notices import Notice, codes_of, has_code, lossy, merged, of_codes
 from algid.physics.effort import absent
@@ -177,7 +177,6 @@ def table_rows(fit: Fit) -> dict[str, Estimate]:
 def fit_summary(found: Fitted) -> results.FitSummary:
     """The statistical part of a result."""
     fit, survey, settings, chosen = found.fit, found.survey, found.settings, found.chosen
-    residual = sum(scores(predictor_of_fit(found), survey), PredictionScore())
     crossed = None  # each log predicted from the others, where asked and possible
     if settings.cross_validate:
         unloaded = [partial(survey.segments, log) for log in survey.unloaded]
@@ -252,7 +251,7 @@ def fit_summary(found: Fitted) -> results.FitSummary:
         broken_bounds=bounds,
         endogeneity=endogeneity,
         by_log=by_log,
-        residual=prediction(residual),
+        residual=predicted_by(predictor_of_fit(found), survey),
         cross_validation=None if crossed is None else prediction(crossed),
         repeatability=repeated,
         torque_gain=gain,

@@ -7,13 +7,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from algid.arm import FloatArray
 from algid.base.text import ABSENT, file_name, visible
 from algid.estimators.prediction import (
     CUTOFF,
     FILTER,
     HORIZONS,
-    PredictionScore,
-    RolloutScore,
+    NOTHING,
     rollouts,
     score,
 )
@@ -33,18 +35,34 @@ if TYPE_CHECKING:
 EVERY = "all logs"
 
 
-def prediction(score: PredictionScore) -> TorquePrediction | None:
-    """As the result holds it; None where every log was too short to judge."""
-    if score.count == 0:
+def prediction(sums: FloatArray) -> TorquePrediction | None:
+    """What the `sums` (9, 2) of a score say; None where every log was too short to judge.
+
+    Of a joint without torque, shares are those of the other joint's. A joint that is hardly driven
+    has little, since inertia, weight and friction make up for one another there: of its load is
+    the RMSE over the torque's RMS, or that of the model's parts where it is larger. NaN is the RMSE
+    of a state that no joint was in.
+    """
+    tau, squares, parts, left = sums[:4]
+    moved, stood = sums[[4, 6]]
+    count = moved + stood
+    if not count.any():
         return None
-    moving, rest, held = ((finite(one), finite(other)) for one, other in score.by_state.tolist())
+    # of a joint without a motor, of the one that drives the arm
+    drive, spread = (
+        np.maximum(np.where(squares > 0, power, power[::-1]), 1e-300)
+        for power in (squares, squares - tau**2 / count)
+    )
+    with np.errstate(invalid="ignore"):
+        by_state = np.sqrt(sums[[5, 7, 8]] / [moved, stood, stood])
+    moving, rest, held = ((finite(one), finite(other)) for one, other in by_state.tolist())
     return TorquePrediction(
-        rmse=score.rmse.tolist(),
-        nrmse=score.nrmse.tolist(),
-        r2=score.r2.tolist(),
+        rmse=np.sqrt(left / count).tolist(),
+        nrmse=np.sqrt(left / drive).tolist(),
+        r2=(1 - left / spread).tolist(),
         filter=FILTER,
         bandwidth=CUTOFF,
-        of_load=score.of_load.tolist(),
+        of_load=np.sqrt(left / np.maximum(drive, parts)).tolist(),
         rmse_moving=moving,
         rmse_rest=rest,
         rmse_held=held,
@@ -140,11 +158,16 @@ class Validated:
             yield Table("Angles of the arm simulated forward", headings, rows)
 
 
-def scores(known: Predictor, survey: Recordings) -> Iterator[PredictionScore]:
-    """How well the torque of each of a survey's logs is predicted; raises as `coefficients`."""
+def scores(known: Predictor, survey: Recordings) -> Iterator[FloatArray]:
+    """The score of each of a survey's logs; raises as `coefficients`."""
     for log in survey.logs:
         c = known.coefficients(log.role)
         yield score(known.model, c, survey.segments(log), known.shift)
+
+
+def predicted_by(known: Predictor, survey: Recordings) -> TorquePrediction | None:
+    """How well the torque of all of a survey's logs together is predicted."""
+    return prediction(sum(scores(known, survey), NOTHING))
 
 
 def validate(known: Predictor, survey: Recordings, *, simulate: bool = False) -> Validated:
@@ -155,29 +178,30 @@ def validate(known: Predictor, survey: Recordings, *, simulate: bool = False) ->
     ResultError
         If a parameter that the prediction needs has no estimate.
     """
-    predictions: dict[str, TorquePrediction | None] = {}
-    simulated: dict[str, RolloutScore] = {}
-    total = PredictionScore()
+    predictions, total = dict[str, TorquePrediction | None](), NOTHING
+    simulated: dict[str, FloatArray] = {}
     for log, one in zip(survey.logs, scores(known, survey), strict=True):
         predictions[log.name] = prediction(one)
-        total += one
+        total = total + one
         if simulate:
             duration, moving = survey.whole(log).duration, survey.segments(log)
             c = known.coefficients(log.role)
             simulated[log.name] = rollouts(known.model, c, moving, duration, known.shift)
     if simulate:
-        simulated[EVERY] = sum(simulated.values(), RolloutScore())
+        simulated[EVERY] = np.sum(list(simulated.values()), axis=0)
     simulation = {}
-    for name, own in simulated.items():
-        columns = zip(HORIZONS, own.count, own.rmse, own.distance, strict=True)
+    for name, (starts, *squares) in simulated.items():
+        with np.errstate(invalid="ignore"):  # without a start a mean is no number
+            means = np.sqrt(squares / starts)
+        columns = zip(HORIZONS, starts[:, 0], *means, strict=True)
         simulation[name] = [
             {
                 "horizon": horizon,
-                "starts": int(starts),
+                "starts": int(count),
                 "rmse": list(map(finite, rmse)),
                 "moved": list(map(finite, moved)),
             }
-            for horizon, starts, rmse, moved in columns
+            for horizon, count, rmse, moved in columns
         ]
     return Validated(predictions, prediction(total), simulation)
 

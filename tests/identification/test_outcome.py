@@ -14,7 +14,7 @@ from scipy.stats import norm
 
 from algid.estimators.combine import LogInformation
 from algid.estimators.fit import Fit
-from algid.estimators.prediction import PredictionScore
+from algid.estimators.prediction import NOTHING
 from algid.estimators.terms import Selection
 from algid.identification.by_likelihood import Fitted
 from algid.identification.checks import fit_notes, remarks
@@ -146,10 +146,10 @@ def test_each_log_tells_its_own_estimates() -> None:
 
 
 def test_a_prediction_without_samples_is_none_and_others_hold_their_sums() -> None:
-    assert prediction(PredictionScore()) is None
+    assert prediction(NOTHING) is None
     rows = np.array([[0.0, 50.0], [400.0, 125.0], [0.0, 0.0], [4.0, 9.0]])
-    sums = PredictionScore(100.0, np.concatenate([rows, np.zeros((5, 2))]))
-    found = prediction(sums)
+    moved = np.full((1, 2), 100.0)
+    found = prediction(np.concatenate([rows, moved, np.zeros((4, 2))]))
     assert found.rmse == pytest.approx((0.2, 0.3))
     assert found.nrmse == pytest.approx((0.1, math.sqrt(9 / 125)))
     # 125 − 50²/100 = 100 is the variance left to explain

@@ -27,6 +27,7 @@ from algid.identification.series import (
     torque_blocks,
     write_fit_series,
 )
+from algid.identification.validate import prediction
 from algid.log import Log, Origin
 from algid.model import Model
 from algid.synth.excitation import wide_multi_sine
@@ -144,7 +145,7 @@ def test_the_torque_in_the_file_is_the_one_that_is_scored(
     survey = Recordings([open_source(both[0][0], "unloaded")])
     wrong = K * np.array([1, 1, 1.1, 0.9, 1, 1, 1.05])
     (block,) = scored_blocks(survey, Predictor(Model(), lambda _: wrong))
-    found = score(Model(), wrong, survey.segments(survey.logs[0]))
+    found = prediction(score(Model(), wrong, survey.segments(survey.logs[0])))
     for joint in (1, 2):
         residual = block[f"tau{joint}"] - block[f"tau{joint}_predicted"]
         assert np.sqrt(np.mean(residual**2)) == pytest.approx(found.rmse[joint - 1], rel=0.02)
