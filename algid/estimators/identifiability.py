@@ -140,13 +140,17 @@ def _left_open(
         why = ": neither joint moved"
     elif still.any():
         why = f": joint {np.argmax(still) + 1} never moved"
+
+    def said(case: str, names: list[str], **numbers: float) -> Notice:
+        about = {"case": case, "names": names, "why": why}
+        return Notice("OPEN_DIRECTION", numbers=about | numbers)
+
     for group in _groups(null):
         part = null[group]
         together = [names[row] for row in group]
         free = int(np.linalg.matrix_rank(part, tol=SHARE))
-        said: list[dict[str, object]]
         if free >= len(group):
-            said = [{"case": "alone", "names": [name]} for name in together]
+            yield from (said("alone", [name]) for name in together)
         elif len(group) == 2:
             widest = np.argmax(np.linalg.norm(part, axis=0))
             first, second = part[:, widest] * size[group]
@@ -155,11 +159,9 @@ def _left_open(
             for name, value in (("sum", 1.0), ("difference", -1.0)):
                 if abs(ratio - value) < 0.15:
                     case = name
-            said = [{"case": case, "names": together, "ratio": ratio}]
+            yield said(case, together, ratio=ratio)
         else:
-            said = [{"case": "several", "names": together, "count": len(group) - free}]
-        for numbers in said:
-            yield Notice("OPEN_DIRECTION", numbers=numbers | {"why": why})
+            yield said("several", together, count=len(group) - free)
 
 
 def _groups(null: FloatArray) -> list[NDArray[np.int64]]:

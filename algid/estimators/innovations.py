@@ -120,20 +120,20 @@ def pooled(sums: Sequence[ResidualSums]) -> ResidualSums | None:
     return total
 
 
-class Spectra(NamedTuple):
-    """Densities (s, F) at frequencies (F,) in Hz, and factors (F,) that hold 95 % of white noise's.
+class Curves(NamedTuple):
+    """Values (s, n) at x (n,), and between which 95 % of white noise's are."""
 
-    Densities are in u²/Hz, one-sided.
-    """
-
-    frequency: FloatArray
-    density: FloatArray
+    x: FloatArray
+    values: FloatArray
     low: FloatArray
     high: FloatArray
 
 
-def spectra(sums: ResidualSums) -> Spectra:
-    """Spectra of all signals; bins are merged until each has `_FREEDOM` degrees of freedom."""
+def spectra(sums: ResidualSums) -> Curves:
+    """One-sided densities of all signals in u²/Hz, by Hz, and the band as a share of white noise's.
+
+    Bins are merged until each has `_FREEDOM` degrees of freedom.
+    """
     starts, count, spread = [], 0.0, 0.0
     begin = last = 0
     for place in range(_BINS):
@@ -145,7 +145,7 @@ def spectra(sums: ResidualSums) -> Spectra:
             begin = last = place + 1
             count, spread = 0.0, 0.0
     if not starts:
-        return Spectra(np.empty(0), np.empty((sums.power.shape[0], 0)), np.empty(0), np.empty(0))
+        return Curves(np.empty(0), np.empty((sums.power.shape[0], 0)), np.empty(0), np.empty(0))
     ends = np.array(starts[1:] + [last]) - 1
     lines = np.add.reduceat(sums.lines[:last], starts)
     scatter = np.add.reduceat(sums.scatter[:last], starts)
@@ -154,19 +154,11 @@ def spectra(sums: ResidualSums) -> Spectra:
     low = chi2_exceeded(freedom, 0.975) / freedom
     high = chi2_exceeded(freedom, 0.025) / freedom
     middle = np.sqrt(_EDGES[starts] * _EDGES[ends + 1])
-    return Spectra(middle / sums.dt, 2 * sums.dt * density, low, high)
+    return Curves(middle / sums.dt, 2 * sums.dt * density, low, high)
 
 
-class Autocorrelation(NamedTuple):
-    """Correlations (2, L) at lags (L,) in s, and half widths (2, L) of white noise's 95 % bands."""
-
-    lag: FloatArray
-    correlation: FloatArray
-    half: FloatArray
-
-
-def autocorrelation(sums: ResidualSums) -> Autocorrelation:
-    """Correlations at multiples of the stride.
+def autocorrelation(sums: ResidualSums) -> Curves:
+    """Correlations of the residual by lags in s, at multiples of the stride.
 
     The band is Bartlett's for a moving average over one stride: its variance is Σ r_i² / n, over
     lags i within the stride, both ways (Bartlett 1946; Box & Jenkins, sec. 2.1.6).
@@ -176,16 +168,16 @@ def autocorrelation(sums: ResidualSums) -> Autocorrelation:
     known = np.flatnonzero(sums.pairs[:: sums.stride] > sums.pairs[0] / 4)[1:] * sums.stride
     variance = 1 + 2 * np.sum(r[:, 1 : sums.stride] ** 2, axis=1)
     half = NORMAL * np.sqrt(variance[:, None] / sums.pairs[known])
-    return Autocorrelation(known * sums.dt, r[:, known], half)
+    return Curves(known * sums.dt, r[:, known], -half, half)
 
 
-def whiteness_of(sums: ResidualSums) -> Spectra:
+def whiteness_of(sums: ResidualSums) -> Curves:
     """Spectra of the residual alone in shares of white noise of the same variance: 1 is white."""
     raw = spectra(sums)
     variance = (sums.products[0, :, 0] / np.maximum(sums.pairs[0], 1.0))[:, None]
-    level = 2 * sums.dt * variance
-    share = np.divide(raw.density[:2], level, out=np.zeros_like(raw.density[:2]), where=level > 0)
-    return Spectra(raw.frequency, share, raw.low, raw.high)
+    level, density = 2 * sums.dt * variance, raw.values[:2]
+    share = np.divide(density, level, out=np.zeros_like(density), where=level > 0)
+    return raw._replace(values=share)
 
 
 class Whiteness(NamedTuple):

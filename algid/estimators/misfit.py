@@ -26,9 +26,9 @@ G       torques beside them                                (2 n, m)          N m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -232,33 +232,18 @@ class Products:
         return np.abs(inverse @ self.total[rest, place]) / np.maximum(size, 1e-300)
 
 
-class _Acting(NamedTuple):
-    """The joints' torques, angles, velocities, their smooth signs, and accelerations (2, n)."""
-
-    T: FloatArray
-    theta: FloatArray
-    omega: FloatArray
-    sign: FloatArray
-    alpha: FloatArray
-
-
-_SHAPES: tuple[tuple[str, Callable[[_Acting], FloatArray]], ...] = (
-    ("gears", lambda j: np.abs(j.T) * j.sign),
-    ("saturation", lambda j: np.abs(j.T) * j.T),
-    ("dead band", lambda j: np.sign(j.T)),
-    ("drag", lambda j: np.abs(j.omega) * j.omega),
-    ("spring", lambda j: j.theta - j.theta.mean(axis=1, keepdims=True)),
-    ("once a turn", lambda j: np.sin(j.theta)),
-    ("once a turn", lambda j: np.cos(j.theta)),
-    ("twice a turn", lambda j: np.sin(2 * j.theta)),
-    ("twice a turn", lambda j: np.cos(2 * j.theta)),
-    ("friction along a turn", lambda j: np.sin(j.theta) * j.sign),
-    ("friction along a turn", lambda j: np.cos(j.theta) * j.sign),
-    ("the other joint", lambda j: j.sign[::-1]),
-    ("the other joint", lambda j: j.omega[::-1]),
-    ("the other joint", lambda j: j.alpha[::-1]),
-)
-"""Torques of a joint in shapes that no term has, and what each belongs to."""
+_KINDS = {
+    "gears": 1,
+    "saturation": 1,
+    "dead band": 1,
+    "drag": 1,
+    "spring": 1,
+    "once a turn": 2,
+    "twice a turn": 2,
+    "friction along a turn": 2,
+    "the other joint": 3,
+}
+"""What makes torques of a joint in shapes that no term has, and how many each: `of_no_term`."""
 _OWN = 1e-6
 """Share of a torque beside the parameters' columns: with less it is one of theirs."""
 _CANCELS = 0.02
@@ -273,14 +258,29 @@ def shapes(model: Model, c: FloatArray, motion: Motion, dt: float) -> FloatArray
     return np.concatenate([widened(model, c, motion, dt), own])
 
 
-def of_no_term(model: Model, acting: FloatArray, motion: Motion) -> list[FloatArray]:
-    """Torques (2, n) of one joint each, in shapes that no term has, where (2, n) N m act."""
-    sign = smooth_sign(model, motion.omega)
-    seen = _Acting(acting, motion.theta, motion.omega, sign, motion.alpha)
-    made = np.zeros((2, len(_SHAPES), *acting.shape))
-    for place, (_, shape) in enumerate(_SHAPES):
-        made[[0, 1], place, [0, 1]] = shape(seen)
-    return list(made.reshape(-1, *acting.shape))
+def of_no_term(model: Model, acting: FloatArray, motion: Motion) -> FloatArray:
+    """Torques (m, 2, n) of one joint each, in shapes that no term has, where (2, n) N m act."""
+    theta, omega = motion.theta, motion.omega
+    sine, cosine, sign = np.sin(theta), np.cos(theta), smooth_sign(model, omega)
+    both = [  # in the order of `_KINDS`
+        np.abs(acting) * sign,
+        np.abs(acting) * acting,
+        np.sign(acting),
+        np.abs(omega) * omega,
+        theta - theta.mean(axis=1, keepdims=True),
+        sine,
+        cosine,
+        np.sin(2 * theta),
+        np.cos(2 * theta),
+        sine * sign,
+        cosine * sign,
+        sign[::-1],
+        omega[::-1],
+        motion.alpha[::-1],
+    ]
+    alone = np.zeros((2, len(both), *acting.shape))
+    alone[[0, 1], :, [0, 1]] = np.stack(both, axis=1)
+    return alone.reshape(-1, *acting.shape)
 
 
 def _acting(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
@@ -324,10 +324,9 @@ def misfit(
     absent = places_outside(names, [*shared.log_names, *WIDTHS])
     # friction's widths are estimated beside the parameters
     free = [names.index(name) for name in WIDTHS]
-    kinds = np.array(
-        [TERM_OF[names[place]] for place in absent] + 2 * [kind for kind, _ in _SHAPES]
-    )
-    rest = [*free, *absent, *range(len(names), len(names) + 2 * len(_SHAPES)), -1]
+    torques = np.tile(np.repeat(list(_KINDS), list(_KINDS.values())), 2)
+    kinds = np.concatenate([[TERM_OF[names[place]] for place in absent], torques])
+    rest = [*free, *absent, *range(len(names), len(names) + torques.size), -1]
     Q, whole = len(fit.names), np.zeros(())
     for loaded, gram in products.each:
         by_shared = np.zeros((len(gram), Q + len(rest)))

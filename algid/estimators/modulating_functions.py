@@ -22,7 +22,7 @@ window.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 
@@ -199,13 +199,13 @@ class Windows:
         return X
 
     def beside(
-        self, piece: Segment, made: Callable[[FloatArray, Motion], Sequence[FloatArray]]
+        self, piece: Segment, made: Callable[[FloatArray, Motion], FloatArray]
     ) -> FloatArray:
-        """Moments (2, m, R) of what is `made` of torques and motion of a piece with a window."""
+        """Moments (2, m, R) of torques (m, 2, n) that are `made` of a piece with a window."""
         theta = piece.theta[:, self.margin : len(piece) - self.margin]
         omega = self.velocities(piece)
         motion = self._accelerated(Motion(theta, omega, omega))
-        rows = np.stack(made(self._acting(piece.tau), motion), axis=1)
+        rows = made(self._acting(piece.tau), motion).swapaxes(0, 1)
         return np.stack([self.moments(own) for own in rows])
 
     def _accelerated(self, motion: Motion) -> Motion:

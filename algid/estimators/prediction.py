@@ -23,7 +23,6 @@ y       angles at the horizons; NaN past a stretch's end                (H, 2, S
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -103,22 +102,13 @@ def _decimated(piece: Segment) -> Segment:
     return Segment(start, step * piece.dt, theta, tau)
 
 
-@dataclass(frozen=True, eq=False)
-class ScoredTorque:
-    """Times (n,) in s of a piece, X (2, q + 1, n) as the filters leave it, velocities (2, n)."""
-
-    t: FloatArray
-    X: FloatArray
-    omega: FloatArray
-
-
 def scored_torque(
     model: Model,
     c: FloatArray,
     segments: Iterable[Segment],
     shift: TorqueShift = AT_ONCE,
-) -> Iterator[ScoredTorque]:
-    """What `score` scores, piece by piece.
+) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    """What `score` scores, piece by piece: times (n,) in s, velocities (2, n), and X.
 
     A piece that is too short to be scored is left out. See the module's table.
     """
@@ -140,7 +130,7 @@ def scored_torque(
         low = butterworth(X.reshape(-1, n), dt, min(CUTOFF, 0.45 / dt))
         kept = slice(edge, n - edge)
         X = low.reshape(X.shape)[:, :, kept]
-        yield ScoredTorque(thin.t[kept], X[:, 1:], X[:, 0])
+        yield thin.t[kept], X[:, 0], X[:, 1:]
 
 
 def motion_of(theta: FloatArray, dt: float) -> Motion:
@@ -163,7 +153,7 @@ def score(
 ) -> FloatArray:
     """How well the coefficients `c` (q,) predict a log's torque, as `sums_of`; see the module."""
     every = scored_torque(model, c, segments, shift)
-    return sum((sums_of(model, c, piece.X, piece.omega) for piece in every), NOTHING)
+    return sum((sums_of(model, c, X, omega) for _, omega, X in every), NOTHING)
 
 
 def cross_validate(
@@ -237,12 +227,10 @@ def time_step(model: Model, c: FloatArray) -> float:
     It divides the horizons.
     """
     around = np.linspace(0, 2 * np.pi, _POSES, endpoint=False)
-    (outer, coupling), (_, inner) = inertia(model, c, np.stack([np.zeros_like(around), around]))
-    rest = Motion(*np.zeros((3, 2, 1)))
-    slope = np.abs(partials(model, c, rest)[1, (0, 1), (0, 1), 0])
-    least = np.maximum(outer * inner - coupling**2, 1e-3 * outer * inner)
+    M = inertia(model, c, np.stack([np.zeros_like(around), around]))
+    slope = partials(model, c, Motion(*np.zeros((3, 2, 1))))[1, :, :, 0]
     # in 1/s, at which friction stops a joint in its worst pose
-    rate = float(np.max(np.maximum(slope[0] * inner, slope[1] * outer) / least))
+    rate = np.abs(np.linalg.pinv(M.T).diagonal(axis1=1, axis2=2) * np.diag(slope)).max()
     step = _LONGEST
     while step * rate > 1 and step > _SHORTEST:
         step /= 2

@@ -107,7 +107,7 @@ def fit(problem: Problem) -> Fit:
         trained, of_width = _settled_widths(trained, logs, anchored, problem.progress)
         if trained.end == "refuted":
             return given_up("noise")
-        if trained.end == "unsettled" or not np.all(np.isfinite(trained.beta)):
+        if trained.end == "unsettled":
             return given_up("not converged")
         if not all(log.whole for log in logs):
             trained = _finish(trained, logs, anchored)

@@ -154,19 +154,18 @@ def linearise(
         motion = flexed(model, c, Motion(*stencil.differences(theta)), stencil.dt, acting)
         return motion, *modelled(model, c, motion, stencil.dt)
 
-    motion, J, torques_of_model = at(theta0)
+    motion, J, tau = at(theta0)
     G = along_stencil(partials(model, c, motion), stencil.weights)
-    rising = torques_of_model
+    error = measured - tau - forward(G, piece.theta - theta0, first)
     if smooth is not None:
-        motion, J, rising = at(smooth)
-    error = measured - torques_of_model - forward(G, piece.theta - theta0, first)
+        motion, J, tau = at(smooth)
     parts = []
     if not residual_only:
         parts.append(J.swapaxes(0, 1))
         if delay:
-            parts.append(np.gradient(rising, stencil.dt, axis=1)[None])
-    parts.append(error[None])
-    H, factor, columns = whitened(np.concatenate(parts), G, noise, stencil.taps)
+            parts.append(np.gradient(tau, stencil.dt, axis=1)[None])
+    rows = np.concatenate([*parts, error[None]])
+    H, factor, columns = whitened(rows, G, noise, stencil.taps)
     return Linearised(columns, factor, H, first, length, motion, stencil.taps)
 
 
@@ -219,9 +218,8 @@ def _low_passed_slope(tau: FloatArray, dt: float, lag: float) -> FloatArray:
     # exact for a torque that is straight between its samples
     decay = np.exp(-dt / lag)
     mean = (1 - decay) * lag / dt
-    numerator, denominator = np.array([1 - mean, mean - decay]), np.array([1.0, -decay])
-    moved = tau - tau[:, :1]
-    return (moved - recursion(numerator, denominator, moved, np.zeros((2, 1)))[0]) / lag
+    numerator, denominator = np.array([mean, -mean]) / lag, np.array([1.0, -decay])
+    return recursion(numerator, denominator, tau - tau[:, :1], np.zeros((2, 1)))[0]
 
 
 def along_stencil(P: FloatArray, weights: FloatArray) -> FloatArray:
@@ -290,15 +288,12 @@ def covariance_factor(H: FloatArray, taps: FloatArray = _AS_LOGGED) -> FloatArra
         band[:, :, -1 - 2 * lag] += value
     diagonal = band[:, :, -1].ravel().copy()
     factor, info = lapack.dpbtrf(band.reshape(2 * n, -1).T, lower=0, overwrite_ab=1)
-    if info == 0:
-        # Whether a pivot of nothing but rounding comes out below zero depends on the processor's
-        # kernels.
-        lost = np.flatnonzero(factor[-1] ** 2 < _ROUNDING * diagonal)
-        if lost.size:
-            info = lost[0] + 1
-    if info != 0:
+    # whether a pivot of nothing but rounding comes out below zero, the processor's kernels decide
+    lost = factor[-1] ** 2 < _ROUNDING * diagonal
+    if info or lost.any():
         raise np.linalg.LinAlgError(
-            f"the covariance of the torque residual is not positive definite (row {info})"
+            "the covariance of the torque residual is not positive definite "
+            f"(row {info or np.argmax(lost) + 1})"
         )
     return factor
 

@@ -19,6 +19,7 @@ from algid.base.arrow import table_of_columns
 from algid.estimators.elastic import flexed
 from algid.estimators.fit import Fit, has_running, running
 from algid.estimators.innovations import (
+    Curves,
     ResidualSums,
     autocorrelation,
     pooled,
@@ -110,10 +111,10 @@ def scored_blocks(survey: Recordings, known: Predictor) -> Iterator[dict[str, Fl
     """The torque that is scored and its prediction, of every log."""
     for number, log in enumerate(survey.logs):
         c = known.coefficients(log.role)
-        for piece in scored_torque(known.model, c, survey.segments(log), known.shift):
-            dt = float(piece.t[1] - piece.t[0])
+        for every, _, rows in scored_torque(known.model, c, survey.segments(log), known.shift):
+            dt = float(every[1] - every[0])
             step = max(1, int(1 / (SCORED_RATE * CUTOFF * dt)))
-            t, X = piece.t[::step], piece.X[:, :, ::step]
+            t, X = every[::step], rows[:, :, ::step]
             rows = np.concatenate([X[:, -1], np.einsum("q,aqn->an", c, X[:, :-1])])
             yield {
                 "log": np.full(t.size, number, dtype=np.int32),
@@ -169,20 +170,16 @@ def innovation_rows(sums: ResidualSums, *, whitened: bool) -> Iterator[dict[str,
     in shares of white noise; that of windows is in (N m)²/Hz and stands beside the torque's own
     through the same windows.
     """
-    r = autocorrelation(sums)
+    curves: dict[str, Curves] = {}
     if whitened:
-        white = whiteness_of(sums)
-        kinds = [(WHITE_SPECTRUM, white.frequency, white.density, white.low, white.high)]
+        curves[WHITE_SPECTRUM] = whiteness_of(sums)
     else:
-        plain, none = spectra(sums), np.array(np.nan)
-        kinds = [
-            (SPECTRUM, plain.frequency, plain.density[:2], none, none),
-            (TORQUE_SPECTRUM, plain.frequency, plain.density[2:], none, none),
-        ]
-    for kind, x, values, low, high in (
-        *kinds,
-        (AUTOCORRELATION, r.lag, r.correlation, -r.half, r.half),
-    ):
+        plain = spectra(sums)
+        plain = plain._replace(low=np.nan * plain.x, high=np.nan * plain.x)
+        curves[SPECTRUM] = plain._replace(values=plain.values[:2])
+        curves[TORQUE_SPECTRUM] = plain._replace(values=plain.values[2:])
+    curves[AUTOCORRELATION] = autocorrelation(sums)
+    for kind, (x, values, low, high) in curves.items():
         yield {
             "quantity": [kind] * values.size,
             "joint": np.repeat(np.arange(1, 3, dtype=np.int32), x.size),

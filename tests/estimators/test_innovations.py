@@ -30,8 +30,8 @@ def test_the_bands_hold_95_percent_of_white_noise_and_tell_it_from_90() -> None:
         pieces = [residual_sums(rng.normal(size=(2, n)), DT) for n in (4000, 2500, 700)]
         sums = pooled(pieces)
         r, S = autocorrelation(sums), whiteness_of(sums)
-        lags, lags_in = lags + r.correlation.size, lags_in + _inside(r.correlation, -r.half, r.half)
-        bins, bins_in = bins + S.density.size, bins_in + _inside(S.density, S.low, S.high)
+        lags, lags_in = lags + r.values.size, lags_in + _inside(r.values, r.low, r.high)
+        bins, bins_in = bins + S.values.size, bins_in + _inside(S.values, S.low, S.high)
     for count, inside in ((lags, lags_in), (bins, bins_in)):
         low, high = binom.interval(0.999, count, 0.95)
         assert low <= inside <= high, (count, inside)
@@ -47,17 +47,17 @@ def test_the_density_of_coloured_noise_is_that_of_its_filter() -> None:
         )
         sums = residual_sums(w, DT)
         found = spectra(sums)
-        exact = 2 * DT * np.abs(1 + 0.8 * np.exp(-2j * np.pi * found.frequency * DT)) ** 2
+        exact = 2 * DT * np.abs(1 + 0.8 * np.exp(-2j * np.pi * found.x * DT)) ** 2
         # the bins are narrow beside the filter's shape but for the highest, where it falls to a
         # hundredth
-        wide = found.frequency < 0.35 / DT
-        share = (found.density / exact)[:, wide]
+        wide = found.x < 0.35 / DT
+        share = (found.values / exact)[:, wide]
         count, inside = (
             count + share.size,
             inside + _inside(share, found.low[wide], found.high[wide]),
         )
         # five standard errors of 20,000 samples
-        np.testing.assert_allclose(autocorrelation(sums).correlation[:, 0], 0.8 / 1.64, atol=0.035)
+        np.testing.assert_allclose(autocorrelation(sums).values[:, 0], 0.8 / 1.64, atol=0.035)
     low, high = binom.interval(0.999, count, 0.95)
     assert low <= inside <= high, (count, inside)
     assert inside > binom.ppf(0.999, count, 0.90)
@@ -65,5 +65,5 @@ def test_the_density_of_coloured_noise_is_that_of_its_filter() -> None:
 
 def test_a_residual_that_is_nothing_is_no_number() -> None:
     found = residual_sums(np.zeros((2, 400)), DT)
-    assert not autocorrelation(found).correlation.any()
-    assert not whiteness_of(found).density.any()
+    assert not autocorrelation(found).values.any()
+    assert not whiteness_of(found).values.any()
