@@ -128,21 +128,18 @@ def of_case(case: Case, source: str, loaded: bool | None, knowns: PriorKnowledge
 
     def parameters(arm: Arm, mass: float) -> FloatArray:
         """Of the arm and a payload that is shaped like the case's."""
-        inertia = case.inertia * (mass / case.payload if case.payload else 1.0)
         value = named_values((*CONSTANT_NAMES, *SINES), arm.phasors())
-        l2 = arm.l2 if x is None else x
-        value |= {"m_p": mass, "l1": arm.l1, "l2": l2, "y_p": y, "J_p": inertia}
+        value |= {"m_p": mass, "l1": arm.l1, "l2": arm.l2 if x is None else x}
+        value |= {"y_p": y, "J_p": case.carrying(mass).inertia}
         return vector(shared.names, value)
 
     more = 1 + (WRONG if knowns.error is None else knowns.error)
-    mean = parameters(arm, mass)
-    wrong = [  # the parameters are linear in each mass and friction
-        parameters(replace(arm, m1=more * arm.m1, I1=more * arm.I1), mass),
-        parameters(replace(arm, m2=more * arm.m2, I2=more * arm.I2), mass),
-        parameters(replace(arm, b1=more * arm.b1), mass),
-        parameters(replace(arm, b2=more * arm.b2), mass),
-        parameters(arm, more * mass),
-    ]
+    mean, wrong = parameters(arm, mass), []
+    for together in (("m1", "I1"), ("m2", "I2"), ("b1",), ("b2",)):
+        larger = {name: more * getattr(arm, name) for name in together}
+        wrong.append(parameters(replace(arm, **larger), mass))
+    wrong.append(parameters(arm, more * mass))
+    # the parameters are linear in each mass and friction
     belief = Belief(shared, mean, (np.array(wrong) - mean).T, box=True)
     return PriorArm(source, belief, np.array([arm.l1, arm.l2]), None)
 

@@ -17,7 +17,7 @@ from algid.options import flag
 from algid.physics.effort import absent
 from algid.settings import Settings
 from algid.signals.differences import TorqueShift
-from algid.signals.observers import PAPER_POLES, LuenbergerObserver
+from algid.signals.observers import PAPER_POLES, observed
 from algid.signals.segments import Segment
 
 
@@ -84,18 +84,13 @@ def with_velocities(survey: Recordings, log: Recording, settings: Settings) -> I
     LogError
         If measured velocities are asked for and the log has none.
     """
-    observer: LuenbergerObserver | None = None
+    if settings.velocity != "measured":
+        yield from observed(survey.segments(log), settings.poles or PAPER_POLES)
+        return
     for segment in survey.segments(log):
-        if settings.velocity == "measured":
-            if segment.omega is None:
-                raise LogError(
-                    f"{log.name}: expected velocities omega1, omega2 for {flag('velocity')}="
-                    "measured, found none; they are observed by "
-                    f"{flag('velocity')}=observer"
-                )
-            yield segment
-            continue
-        observer = observer or LuenbergerObserver(segment.dt, settings.poles or PAPER_POLES)
-        if not segment.continues:
-            observer.reset()
-        yield replace(segment, omega=observer.velocities(segment.theta))
+        if segment.omega is None:
+            raise LogError(
+                f"{log.name}: expected velocities omega1, omega2 for {flag('velocity')}="
+                f"measured, found none; they are observed by {flag('velocity')}=observer"
+            )
+        yield segment

@@ -1,4 +1,4 @@
-"""Filters: zero-phase ones by matrix products, recursive ones by banded substitution.
+"""Filters: zero-phase ones by correlation, recursive ones by banded substitution.
 
 No loop over samples.
 
@@ -14,14 +14,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from algid.arm import FloatArray
+from algid.arm import FloatArray, read_only
 from algid.base.compiled import lapack
 
 _KAISER_BETA = 7.0  # stop band at -70 dB
 _PERIODS = 2.5  # half length of a kernel in periods of its bandwidth
 _LEAST = 3  # half length that three odd moments ask for, however slowly a log was sampled
 _SETTLED = 3.0  # periods of a Butterworth filter's cutoff, after which it forgets to some 1e-4
-_ROWS = 32  # outputs a matrix product makes at once
 
 
 def half_length(dt: float, bandwidth: float) -> int:
@@ -43,7 +42,7 @@ def differentiator(dt: float, bandwidth: float) -> FloatArray:
     s = n / n[-1]
     odd = np.stack([s, s**3, s**5])
     wanted = np.array([1 / (n[-1] * dt), 0.0, 0.0])
-    return _shared(
+    return read_only(
         kernel + np.linalg.solve((odd * taper) @ odd.T, wanted - odd @ kernel) @ (odd * taper)
     )
 
@@ -53,13 +52,7 @@ def smoother(dt: float, bandwidth: float) -> FloatArray:
     """Kernel (2 M + 1,) whose correlation with a signal passes what lies below `bandwidth` Hz."""
     n, taper = _support(dt, bandwidth)
     kernel = np.sinc(2 * bandwidth * dt * n) * taper
-    return _shared(kernel / kernel.sum())
-
-
-def _shared(kernel: FloatArray) -> FloatArray:
-    """The kernel, now read-only: it is kept for the next piece of log."""
-    kernel.flags.writeable = False
-    return kernel
+    return read_only(kernel / kernel.sum())
 
 
 def _support(dt: float, bandwidth: float) -> tuple[FloatArray, FloatArray]:
@@ -71,23 +64,13 @@ def _support(dt: float, bandwidth: float) -> tuple[FloatArray, FloatArray]:
 def correlate(x: FloatArray, kernel: FloatArray, step: int = 1) -> FloatArray:
     """Correlation of each row of x (m, N) with a kernel (K,), where they overlap entirely.
 
+    N is K at least.
+
     Returns
     -------
     (m, (N - K) // step + 1): every `step`-th value of it
     """
-    taps = kernel.size
-    wanted = (x.shape[1] - taps) // step + 1
-    rows = max(4, _ROWS // step)
-    blocks = -(-wanted // rows)
-    width = (rows - 1) * step + taps
-    padded = np.zeros((x.shape[0], (blocks - 1) * rows * step + width))
-    used = min(x.shape[1], padded.shape[1])
-    padded[:, :used] = x[:, :used]
-    windows = np.lib.stride_tricks.sliding_window_view(padded, width, axis=1)[:, :: rows * step]
-    toeplitz = np.zeros((width, rows))
-    for column in range(rows):
-        toeplitz[column * step : column * step + taps, column] = kernel
-    return (np.ascontiguousarray(windows) @ toeplitz).reshape(x.shape[0], -1)[:, :wanted]
+    return np.stack([np.correlate(row, kernel, "valid")[::step] for row in x])
 
 
 def smoothed(x: FloatArray, dt: float, bandwidth: float) -> FloatArray:

@@ -20,10 +20,14 @@ for the paper's poles: its iteration does not settle.)
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
 import numpy as np
 
 from algid.arm import FloatArray
 from algid.signals.filters import recursion
+from algid.signals.segments import Segment
 
 PAPER_POLES = (-80.0, -390.0, -391.0, -392.0, -393.0, -394.0)
 
@@ -52,62 +56,41 @@ def observer_gain(poles: tuple[complex, ...]) -> FloatArray:
     return gain
 
 
-class LuenbergerObserver:
-    """The observer x̂' = (A − L C) x̂ + L y, discretised exactly for piecewise linear angles.
+def observed(
+    segments: Iterable[Segment], poles: tuple[complex, ...] = PAPER_POLES
+) -> Iterator[Segment]:
+    """Segments of a log with the joint velocities in rad/s that the observer sees.
 
-    It carries its state from call to call, so that a long log may pass through in pieces. From the
-    angle to the velocity each joint's three poles p make the transfer function
+    It is x̂' = (A − L C) x̂ + L y, discretised exactly for piecewise linear angles, and starts each
+    stretch at rest at its first angles. From the angle to the velocity each joint's three poles p
+    make the transfer function
 
         (l2 s + l3) s / (s³ + l1 s² + l2 s + l3),    s³ + l1 s² + l2 s + l3 = Π (s − p)
 
     which runs as a recursion of third order.
-
-    Parameters
-    ----------
-    dt : float, s
-    poles : six complex, rad/s
     """
-
-    def __init__(self, dt: float, poles: tuple[complex, ...] = PAPER_POLES) -> None:
-        gain = observer_gain(poles)
-        joints = (slice(0, 3), slice(3, 6))
-        self._filters = []
-        for joint, own in enumerate(joints):
-            self._filters.append(_differentiator(gain[own, joint], poles[own], dt))
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the state: the next call starts at rest."""
-        self._rest: FloatArray | None = None
-        self._states = np.zeros((2, 3))
-
-    def velocities(self, theta: FloatArray) -> FloatArray:
-        """Observed joint velocities (2, N) in rad/s of the angles `theta` (2, N) in rad.
-
-        The first call, and the first one after `reset`, starts at rest at the first angles; any
-        other takes `theta` as following the last sample of the call before.
-        """
-        if self._rest is None:
-            self._rest = theta[:, 0].copy()
-        omega = np.empty_like(theta)
-        for joint, (numerator, denominator) in enumerate(self._filters):
+    rest: FloatArray = np.zeros((2, 1))
+    states = np.zeros((2, 3))
+    for segment in segments:
+        if not segment.continues:
+            rest, states = segment.theta[:, :1], np.zeros((2, 3))
+        omega = np.empty_like(segment.theta)
+        for joint in range(2):
             own = slice(joint, joint + 1)
-            moved = theta[own] - self._rest[own, None]
-            omega[own], self._states[own] = recursion(
-                numerator, denominator, moved, self._states[own]
+            numerator, denominator = _differentiator(poles[3 * joint : 3 * joint + 3], segment.dt)
+            omega[own], states[own] = recursion(
+                numerator, denominator, segment.theta[own] - rest[own], states[own]
             )
-        return omega
+        yield replace(segment, omega=omega)
 
 
-def _differentiator(
-    gain: FloatArray, poles: tuple[complex, ...], dt: float
-) -> tuple[FloatArray, FloatArray]:
+def _differentiator(poles: tuple[complex, ...], dt: float) -> tuple[FloatArray, FloatArray]:
     """Numerator and denominator (4,) in z⁻¹ of a joint's velocity, for piecewise linear angles.
 
     The numerator is what makes the response to one sample, a triangle of ± dt around it (a
     first-order hold).
     """
-    held = np.zeros((5, 5))
+    held, gain = np.zeros((5, 5)), np.poly(np.array(poles)).real[1:]
     held[:3, :3] = (_CHAIN - np.outer(gain, np.eye(3)[0])) * dt
     held[:3, 3] = gain * dt
     held[3, 4] = 1.0

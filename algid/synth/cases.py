@@ -6,7 +6,7 @@ of Table 4.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Annotated
@@ -51,15 +51,18 @@ class Case:
     inertia: float = 0.0
     """Of the payload about its centre of mass, kg m^2."""
 
-    def constants(self, payload: float) -> FloatArray:
-        """Constants (10,) with `payload` kg; another mass has the shape of the case's payload."""
-        x, y = self.place
+    def carrying(self, payload: float) -> Case:
+        """The case with `payload` kg, of the same shape."""
         inertia = self.inertia
         if self.payload:
             inertia *= payload / self.payload
         elif not payload:
             inertia = 0.0
-        return self.arm.phasors(payload, x, y, inertia)
+        return replace(self, payload=payload, inertia=inertia)
+
+    def constants(self, payload: float) -> FloatArray:
+        """Constants (10,) with `payload` kg; another mass has the shape of the case's payload."""
+        return self.arm.phasors(payload, *self.place, self.carrying(payload).inertia)
 
 
 class _Table(BaseModel):

@@ -22,7 +22,9 @@ Where the rows do without, φ is nothing: its price is a part of each mass's pre
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,15 +102,11 @@ def drift_of(cells: Cells, starts: NDArray[np.int64], variance: float) -> Drift:
     count, f = knots.size, M.shape[1] - 1
     A = np.maximum(np.add.reduceat(cells.A, starts), 1e-300)
     G, N = np.zeros((starts.size, count, f)), np.zeros((count, count, f, f))
-    interval, hats = _hats(knots, t)
-    runs = np.union1d(starts, np.flatnonzero(np.diff(interval)) + 1)
-    group, knot = np.searchsorted(starts, runs, side="right") - 1, interval[runs]
-    for side, hat in enumerate(hats):
-        by_hat = hat[:, None, None] * M[:, :, 1:]
-        np.add.at(G, (group, knot + side), np.add.reduceat(by_hat[:, 0], runs))
-        for other, beside in enumerate(hats):
-            both = np.add.reduceat(beside[:, None, None] * by_hat[:, 1:], runs)
-            np.add.at(N, (knot + side, knot + other), both)
+    group = np.searchsorted(starts, np.arange(t.size), side="right") - 1
+    for two, own, hats in _intervals(knots, t):
+        N[two, two] += np.einsum("ac,bc,cfg->abfg", hats, hats, M[own, 1:, 1:])
+        found, runs = np.unique(group[own], return_index=True)
+        G[found, two] += np.add.reduceat(hats.T[:, :, None] * M[own, :1, 1:], runs)
     size = count * f
     G, N = G.reshape(starts.size, size), N.swapaxes(1, 2).reshape(size, size)
     by_mass = G / A[:, None]
@@ -130,23 +128,29 @@ def variances(J: FloatArray, covariance: FloatArray) -> FloatArray:
 
 def between(knots: FloatArray, values: FloatArray, t: FloatArray) -> FloatArray:
     """Values (C, ...) at times `t` (C,) by linear interpolation of (H, ...) at the knots (H,)."""
-    interval, hats = _hats(knots, t)
-    early, late = hats.reshape(2, -1, *[1] * (values.ndim - 1))
-    return np.asarray(early * values[interval] + late * values[interval + 1])
+    found = np.empty((t.size, *values.shape[1:]))
+    for two, own, hats in _intervals(knots, t):
+        found[own] = np.tensordot(hats.T, values[two], axes=1)
+    return found
 
 
 def _onto(knots: FloatArray, t: FloatArray, values: FloatArray) -> FloatArray:
-    """Sums (H, ...) of values (C, ...) at increasing times `t` (C,), each times its knot's hat."""
+    """Sums (H, ...) of values (C, ...) at the times `t` (C,), each times its knot's hat."""
     sums = np.zeros((knots.size, *values.shape[1:]))
-    interval, hats = _hats(knots, t)
-    found, runs = np.unique(interval, return_index=True)
-    for side, hat in enumerate(hats.reshape(2, -1, *[1] * (values.ndim - 1))):
-        sums[found + side] += np.add.reduceat(hat * values, runs)
+    for two, own, hats in _intervals(knots, t):
+        sums[two] += np.tensordot(hats, values[own], axes=1)
     return sums
 
 
-def _hats(knots: FloatArray, t: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
-    """The knot (C,) before each time `t` (C,), and the hats (2, C) of that one and the next."""
-    interval = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, knots.size - 2)
-    late = (t - knots[interval]) / np.diff(knots)[interval]
-    return interval, np.stack([1 - late, late])
+def _intervals(knots: FloatArray, t: FloatArray) -> Iterator[tuple[slice, slice, FloatArray]]:
+    """Of each two neighbouring knots their places, those of the times between, and hats (2, c).
+
+    The times `t` (C,) increase. Those before the first knot or behind the last one are between the
+    two next to it.
+    """
+    edges = np.searchsorted(t, knots)
+    edges[[0, -1]] = 0, t.size
+    for first, (start, end) in enumerate(pairwise(edges.tolist())):
+        if start < end:
+            late = (t[start:end] - knots[first]) / (knots[first + 1] - knots[first])
+            yield slice(first, first + 2), slice(start, end), np.stack([1 - late, late])

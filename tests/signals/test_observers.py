@@ -12,9 +12,10 @@ from algid.signals.observers import (
     PAPER_POLES,
     A,
     C,
-    LuenbergerObserver,
+    observed,
     observer_gain,
 )
+from algid.signals.segments import Segment
 
 DT = 1e-3
 
@@ -32,21 +33,21 @@ def test_velocities_are_those_of_the_differential_equation(poles: tuple[complex,
 
     start = np.array([theta[0, 0], 0, 0, theta[1, 0], 0, 0])
     exact = solve_ivp(rate, (0, t[-1]), start, t_eval=t, rtol=1e-9, atol=1e-9, max_step=DT).y
-    found = LuenbergerObserver(DT, poles).velocities(theta)
+    halves = [
+        Segment(0.0, DT, part, part, continues=bool(place))
+        for place, part in enumerate(np.split(theta, [25], axis=1))
+    ]
+    found = np.hstack([piece.omega for piece in observed(halves, poles)])
     # solve_ivp's own tolerance, on velocities up to 8 rad/s, across the corners of y
     np.testing.assert_allclose(found, exact[[1, 4]], atol=2e-5)
 
 
-def test_after_a_reset_the_observer_starts_at_rest_where_it_is() -> None:
+def test_after_a_gap_the_observer_starts_at_rest_where_it_is() -> None:
     rng = np.random.default_rng(3)
     first, second = np.cumsum(rng.normal(size=(2, 2, 200)), axis=2)
-    observer = LuenbergerObserver(DT)
-    observer.velocities(first)
-    observer.reset()
-    found = observer.velocities(second + 5.0)
-    np.testing.assert_allclose(
-        found, LuenbergerObserver(DT).velocities(second), rtol=1e-9, atol=1e-6
-    )
+    whole = [Segment(0.0, DT, theta, theta) for theta in (second, first, second + 5.0)]
+    alone, _, found = (piece.omega for piece in observed(whole))
+    np.testing.assert_allclose(found, alone, rtol=1e-9, atol=1e-6)
     assert np.all(np.abs(found[:, 0]) < 1e-6)
 
 
