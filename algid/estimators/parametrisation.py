@@ -82,24 +82,27 @@ class Shared:
             value.get("J_p", 0.0),
         )
 
-    def turn(self, beta: FloatArray) -> tuple[float, FloatArray]:
-        """Correction to add to θ1, arg K2 - arg K1 in rad; its derivative (q,) by coefficients."""
-        slope, turn = np.zeros(len(self.log_names)), 0.0
+    def phase(self, beta: FloatArray, *moments: str) -> tuple[float, FloatArray]:
+        """Arg K - arg K' + arg K'' of `moments` in rad, and its derivative (q,) by coefficients.
+
+        Nothing where the first has no sine part. That of K2 and K1 is to be added to θ1.
+        """
+        slope, phase = np.zeros(len(self.log_names)), 0.0
         place = self.model.compiled.place
-        if SINE_OF.get(K2) not in place:
-            return turn, slope
-        for name, sign in ((K2, 1.0), (K1, -1.0)):
+        if SINE_OF.get(moments[0]) not in place:
+            return phase, slope
+        for name, sign in zip(moments, (1.0, -1.0, 1.0), strict=False):
             cosine, sine = place[name], place[SINE_OF[name]]
             K = complex(beta[cosine], beta[sine])
-            turn += sign * float(np.angle(K))
+            phase += sign * float(np.angle(K))
             size = max(abs(K) ** 2, 1e-300)
             slope[cosine] -= sign * K.imag / size
             slope[sine] += sign * K.real / size
-        return turn, slope
+        return phase, slope
 
     def moments(self, beta: FloatArray) -> NDArray[np.complex128]:
         """The payload's constants and phasors z (5,)."""
-        turn, _ = self.turn(beta)
+        turn, _ = self.phase(beta, K2, K1)
         return np.array(payload_phasors(*self.physical(beta), self.model.gravity, turn))
 
     def coefficients(self, beta: FloatArray, loaded: bool) -> FloatArray:
@@ -115,7 +118,7 @@ class Shared:
         q, Q = len(self.log_names), len(self.names)
         T = np.eye(q, Q)
         if loaded:
-            (rows, parts), (_, slope) = self._loaded, self.turn(beta)
+            (rows, parts), (_, slope) = self._loaded, self.phase(beta, K2, K1)
             turned = 1j * self.moments(beta) * _UPRIGHT
             T[rows, :q] += turned.view(np.float64)[parts, None] * slope
             # the payload's part is quadratic in each of its parameters: any step is exact

@@ -27,12 +27,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from math import remainder, sqrt, tau
 from pathlib import PurePath
 
 import numpy as np
 
 from algid import results
-from algid.arm import FloatArray
 from algid.base.names import within
 from algid.base.significance import NORMAL, SURE, chance
 from algid.estimators.combine import of_kind
@@ -375,18 +375,11 @@ def turn_note(fit: Fit, log: Recording) -> Iterator[Notice]:
     yield Notice("WRONG_ZERO", numbers=numbers, remedies=(zeroed(log.origin, turn, half), anyway))
 
 
-def _angle(fit: Fit, *names: str) -> tuple[float, float]:
-    """Arg K − arg K' + arg K'' of moments by `names`, and half its 95 % interval, in rad."""
-
-    def product(beta: FloatArray) -> complex:
-        K = [phasor(fit.shared.model, beta, name) for name in names]
-        K[1:2] = [one.conjugate() for one in K[1:2]]
-        return complex(np.prod(K))
-
-    found = product(fit.values)
-    # beside its own value no angle is cut at half a turn
-    _, std = measured(fit, lambda beta: np.angle(product(beta) * found.conjugate()))
-    return float(np.angle(found)), fit.quantile * std
+def _angle(fit: Fit, *moments: str) -> tuple[float, float]:
+    """Arg K − arg K' + arg K'' of `moments`, and half its 95 % interval, in rad."""
+    angle, slope = fit.shared.phase(fit.values, *moments)
+    variance = float(slope @ fit.covariance[: slope.size, : slope.size] @ slope)
+    return remainder(angle, tau), fit.quantile * sqrt(max(variance, 0.0))
 
 
 LONGEST, BOTH_LONG = 5.0, 2.0
