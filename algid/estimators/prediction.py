@@ -157,10 +157,7 @@ def score(
 
 
 def cross_validate(
-    fit: Fit,
-    unloaded: Sequence[Source],
-    loaded: Sequence[Source] = (),
-    shift: TorqueShift = AT_ONCE,
+    fit: Fit, sources: Sequence[Source], shift: TorqueShift = AT_ONCE
 ) -> FloatArray | None:
     """Score of each log predicted from all the others; None where a kind of log has only one.
 
@@ -168,8 +165,8 @@ def cross_validate(
     only the prediction reads the logs again. `shift` is what is known of the time after which a
     torque acts: a delay that the fit estimates comes on top, each time as the other logs have it.
     """
-    sources = list(unloaded) + list(loaded)
-    if len(sources) != len(fit.logs) or len(unloaded) == 1 or len(loaded) == 1:
+    kinds = [log.loaded for log in fit.logs]
+    if len(sources) != len(kinds) or 1 in map(kinds.count, kinds):
         return None
     total, columns = NOTHING, len(fit.shared.model.names)
     without = left_out(fit.shared, fit.logs, fit.values, fit.prior)

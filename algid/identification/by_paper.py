@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from functools import partial
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -17,18 +18,19 @@ from algid.estimators.paper import (
     STAGE1_SERIES,
     STAGE2_NAMES,
     STAGE2_SERIES,
-    PaperSeries,
     estimates,
     series_of,
     stage1,
     stage2,
     wanders,
 )
-from algid.identification.outcome import distrusted, started
+from algid.identification.known import wrong_inertia
+from algid.identification.outcome import started
 from algid.identification.passes import with_velocities
 from algid.identification.recordings import Recording, Recordings
 from algid.identification.series import write_columns
 from algid.methods import settles
+from algid.model import K6, K7
 from algid.model import UNITS as PARAMETER_UNITS
 from algid.options import flag
 from algid.results import Estimate, Result, Status
@@ -40,7 +42,9 @@ _UNITS = PARAMETER_UNITS | UNITS
 PAYLOAD = ("m_p", "l1")
 STAGE1_FILE = "estimates.parquet"
 STAGE2_FILE = "loaded.parquet"
-ROWS = 1 << 17  # of a block of the series
+BLOCK = 60.0
+"""s of windows that are written together."""
+_FRICTION = [CONSTANT_NAMES.index(name) for name in (K6, K7)]
 
 
 def run_paper(
@@ -74,13 +78,15 @@ def run_paper(
                 f"{flag('estimator')} refined or weak"
             )
     parameters, loaded, payload, rows = (dict[str, Estimate]() for _ in range(4))
-    k, wrong = known, list[str]()
+    k = known
     if survey.unloaded:
         values, wander, usable = _estimate(survey, survey.unloaded[0], settings, None, folder)
         k = values[: len(CONSTANT_NAMES)]
-        parameters = _named(CONSTANT_NAMES, values, usable)
-        if _is_no_arm(np.where(usable[: k.size], k, np.nan), wander):
-            wrong.append("parameters")
+        # NaN where they are not known
+        sure, most = np.where(usable, [values, values + FAR_BEYOND * wander], np.nan)
+        no_arm = wrong_inertia(dict(zip(CONSTANT_NAMES, sure, strict=False))) is not None
+        wrong = no_arm or bool(np.any(most[_FRICTION] < 0))
+        parameters = _named(CONSTANT_NAMES, values, usable, wrong=wrong)
         if usable.all():
             rows = _named(UNLOADED_ROWS, np.array([*sums(UNLOADED_ROWS, k).values()]), usable)
     if survey.loaded:
@@ -88,14 +94,12 @@ def run_paper(
         usable = values > 0  # none where stage 1 failed
         if k is not None and np.isfinite(k).all():
             values, wander, usable = _estimate(survey, survey.loaded[0], settings, k, folder)
-        loaded = _named(STAGE2_NAMES, values, usable)
         own = [STAGE2_SERIES.index(name) for name in PAYLOAD]
-        payload = _named(PAYLOAD, values[own], usable[own])
-        if np.any((values + FAR_BEYOND * wander)[own] < 0):
-            wrong += ["loaded", "payload"]
-    result = started(survey, settings, rows | loaded | payload)
-    changes = {"parameters": parameters, "loaded": loaded, "payload": payload}
-    return distrusted(result.model_copy(update=changes), wrong)
+        wrong = bool(np.any((values + FAR_BEYOND * wander)[own] < 0))
+        loaded = _named(STAGE2_NAMES, values, usable, wrong=wrong)
+        payload = _named(PAYLOAD, values[own], usable[own], wrong=wrong)
+    every = rows | loaded | payload
+    return started(survey, settings, every, parameters=parameters, loaded=loaded, payload=payload)
 
 
 def _estimate(
@@ -118,7 +122,7 @@ def _estimate(
     asked = settles(settings.estimator)
     window = (settings.window if asked else None) or STAGE1_WINDOW
     moving = with_velocities(survey, log, settings)
-    names: Sequence[str]
+    names: tuple[str, ...]
     if k is None:
         names, file = STAGE1_SERIES, STAGE1_FILE
         series = series_of(moving, window, stage1)
@@ -128,57 +132,34 @@ def _estimate(
     settled = list[FloatArray]()
 
     def columns() -> Iterator[dict[str, FloatArray]]:
-        """Blocks of whole windows, each of some `ROWS` samples."""
-        gathered, rows = list[PaperSeries](), 0
-        for one in series:
-            settled.append(one.settled)
-            gathered.append(one)
-            rows += one.t.size
-            if rows >= ROWS:
-                yield _columns(gathered, names)
-                gathered, rows = [], 0
-        if gathered:
-            yield _columns(gathered, names)
+        """Blocks of whole windows."""
+        while windows := list(islice(series, max(1, round(BLOCK / window)))):
+            settled.extend(one.settled for one in windows)
+            values = np.concatenate([one.values for one in windows], axis=1)
+            named = dict(zip(names, values, strict=True))
+            named.pop("k5+k3", None)  # the sum is Table 4's and follows from the others
+            yield {"t": np.concatenate([one.t for one in windows])} | named
 
     if folder is None:
         for _ in columns():
             pass
     else:
         write_columns(folder / file, columns(), [survey.whole(log).first_ns])
-    duration = survey.summary(log).duration
-    if duration < SHORTEST - 1e-9:
+    if log.duration < SHORTEST - 1e-9:
         raise LogError(
-            f"{log.name}: {duration:.3g} s long; the paper's method needs {SHORTEST:g} s at least "
-            "to settle; record longer"
+            f"{log.name}: {log.duration:.3g} s long; the paper's method needs {SHORTEST:g} s at "
+            "least to settle; record longer"
         )
     estimate, wander = estimates(settled, len(names))
     return estimate, wander, ~wanders(estimate, wander)
 
 
-def _columns(windows: Sequence[PaperSeries], names: Sequence[str]) -> dict[str, FloatArray]:
-    values = np.concatenate([window.values for window in windows], axis=1)
-    columns = dict(zip(names, values, strict=True))
-    columns.pop("k5+k3", None)  # the sum is Table 4's and follows from the others
-    return {"t": np.concatenate([window.t for window in windows])} | columns
-
-
-def _is_no_arm(k: FloatArray, wander: FloatArray) -> bool:
-    """Whether no arm has these constants (7,): friction far below zero, or mass not positive.
-
-    Constants are NaN where they are not known.
-    """
-    if np.any((k + FAR_BEYOND * wander[: k.size])[[5, 6]] < 0):
-        return True
-    # eq. (2): det M = k3 k5 − k1² wherever joint 2 is turned by half a turn or not at all
-    return bool(k[2] <= 0 or k[2] * k[4] <= k[0] ** 2)
-
-
 def _named(
-    names: Collection[str], values: FloatArray, usable: NDArray[np.bool_]
+    names: Collection[str], values: FloatArray, usable: NDArray[np.bool_], *, wrong: bool = False
 ) -> dict[str, Estimate]:
-    """Estimates by name; those that are not usable have none."""
-    named = {}
-    for name, value, good in zip(names, values.tolist(), usable.tolist(), strict=False):
-        known = (finite(value), Status.OK) if good else (None, Status.WEAK_EXCITATION)
+    """Estimates by name; those that are not usable have none. No arm has those that are `wrong`."""
+    named, good = {}, Status.IMPLAUSIBLE if wrong else Status.OK
+    for name, value, there in zip(names, values.tolist(), usable.tolist(), strict=False):
+        known = (finite(value), good) if there else (None, Status.WEAK_EXCITATION)
         named[name] = Estimate(estimate=known[0], unit=_UNITS[name], status=known[1])
     return named

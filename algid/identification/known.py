@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
 FAR = sigmas(CERTAIN)  # beyond which two statements contradict each other
+SENSORS = ("theta1", "theta2", "tau1", "tau2")
+"""Channels whose noise a result has."""
 
 
 def model_of(result: Result) -> Model:
@@ -136,7 +138,7 @@ def noise_of(result: Result) -> NoiseLevels | None:
     """Noise of the logs behind a result; None unless all four levels are known and above zero."""
     if result.fit is None:
         return None
-    levels = vector(("theta1", "theta2", "tau1", "tau2"), result.fit.noise, otherwise=0.0)
+    levels = vector(SENSORS, result.fit.noise, otherwise=0.0)
     if levels.min() <= 0:
         return None
     return NoiseLevels(*levels.reshape(2, 2))
@@ -169,9 +171,13 @@ def given_lengths(result: Result) -> dict[str, float]:
 
 
 def wrong_inertia(values: Mapping[str, float]) -> str | None:
-    """That no arm has the inertia matrix of these constants, in words; None where one has."""
+    """That no arm has the inertia matrix of these constants, in words; None where one has.
+
+    Constants are NaN where they are not known.
+    """
     k1, k3, k5 = abs(phasor_of(values, K1)), values[K3], values[K5]
-    if min(k3, k5) > 0 and k3 * k5 > k1**2:
+    # eq. (2): det M = k3 k5 − k1² wherever joint 2 is turned by half a turn or not at all
+    if not (k3 <= 0 or k3 * k5 <= k1**2):
         return None
     return (
         f"its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 {k5:.3g} kg m²)"

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import PurePath
+from typing import Any
 
 import numpy as np
 
 from algid import __version__, results
 from algid.arm import CONSTANT_NAMES
-from algid.base.names import outside, places_outside, within
+from algid.base.names import named_values, outside, places_outside, within
 from algid.base.significance import chance, level
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, repeatability, term_worths
 from algid.estimators.fit import Fit
@@ -20,7 +21,7 @@ from algid.estimators.prediction import cross_validate
 from algid.estimators.terms import Selection
 from algid.identification.by_likelihood import Fitted
 from algid.identification.checks import fit_notes, remarks
-from algid.identification.known import FAR
+from algid.identification.known import FAR, SENSORS
 from algid.identification.recordings import Recordings
 from algid.identification.series import predictor_of_fit
 from algid.identification.validate import predicted_by, prediction
@@ -40,11 +41,16 @@ from algid.table4 import (
 )
 from algid.table4 import UNITS as TABLE_UNITS
 
-GROUPS = ("parameters", "loaded", "payload")
 
-
-def started(survey: Recordings, settings: Settings, rows: Mapping[str, Estimate]) -> Result:
-    """A result of a survey's logs with Table 4's `rows`, yet without parameters."""
+def started(
+    survey: Recordings,
+    settings: Settings,
+    rows: Mapping[str, Estimate],
+    *,
+    parameters: dict[str, Estimate],
+    **found: Any,
+) -> Result:
+    """A result of a survey's logs with Table 4's `rows` and what else was `found`."""
     truth = survey.logs[0].origin.truth
     payload = None
     if survey.loaded and survey.loaded[0].origin.truth:
@@ -52,20 +58,20 @@ def started(survey: Recordings, settings: Settings, rows: Mapping[str, Estimate]
     first, *others = map(survey.summary, survey.logs)
     return Result(
         version=__version__,
-        estimator=settings.estimator,
-        parameters={},
+        parameters=parameters,
         table4=table4(rows, truth, payload),
         truth=true_parameters(truth, payload),
         settings=settings.as_json(),
         log=first,
         more_logs=others,
+        **{"estimator": settings.estimator} | found,
     )
 
 
-def distrusted(result: Result, groups: Sequence[str] = GROUPS) -> Result:
-    """The result with no status OK left in those `groups` of its estimates."""
+def distrusted(result: Result) -> Result:
+    """The result with no status OK left among its estimates."""
     changed = {}
-    for group in groups:
+    for group in ("parameters", "loaded", "payload"):
         changed[group] = dict(getattr(result, group))
         for name, one in changed[group].items():
             if one.usable:
@@ -97,15 +103,16 @@ def outcome_of(found: Fitted) -> Result:
     notices = list(remarks(found))
     if settings.cross_validate and summary.cross_validation is None:
         notices.append(Notice("SHORT_LOG", numbers={"case": "validation"}))
-    result = started(found.survey, settings, rows | payload).model_copy(
-        update={
-            "estimator": fit.estimator,
-            "parameters": parameters,
-            "loaded": loaded,
-            "payload": payload,
-            "fit": summary,
-            "notices": [*notices, *fit_notes(summary)],
-        }
+    result = started(
+        found.survey,
+        settings,
+        rows | payload,
+        parameters=parameters,
+        estimator=fit.estimator,
+        loaded=loaded,
+        payload=payload,
+        fit=summary,
+        notices=[*notices, *fit_notes(summary)],
     )
     judged = summary.prediction
     if "FROM_PRIOR" in fit.status:  # a prior errs by as much as it says
@@ -179,13 +186,11 @@ def fit_summary(found: Fitted) -> results.FitSummary:
     fit, survey, settings, chosen = found.fit, found.survey, found.settings, found.chosen
     crossed = None  # each log predicted from the others, where asked and possible
     if settings.cross_validate:
-        unloaded = [partial(survey.segments, log) for log in survey.unloaded]
-        loaded = [partial(survey.segments, log) for log in survey.loaded]
-        crossed = cross_validate(fit, unloaded, loaded, settings.torque_shift())
+        logs = [partial(survey.segments, log) for log in survey.logs]
+        crossed = cross_validate(fit, logs, settings.torque_shift())
     noise = {}  # root mean squares over the logs
     if fit.noise:
-        squares = np.sqrt(np.mean(np.square(fit.noise), axis=0)).ravel().tolist()
-        noise = dict(zip(("theta1", "theta2", "tau1", "tau2"), squares, strict=True))
+        noise = named_values(SENSORS, np.sqrt(np.mean(np.square(fit.noise), axis=0)).ravel())
     there, lost = places_outside(fit.names, fit.absent), np.isinf(fit.std)
     covariance = np.where(lost | lost[:, None], np.inf, fit.covariance)[np.ix_(there, there)]
     by_log = [_estimates(replace(log, quantile=fit.quantile)) for log in fit.each]
@@ -202,10 +207,11 @@ def fit_summary(found: Fitted) -> results.FitSummary:
         gain = _inverse(fit, "m_p", known, "1")
     whiteness = {}  # empty where no test was made
     if (tests := fit.whiteness) is not None:
-        numbers = zip(tests.joint_white, tests.p_value.tolist(), tests.lag1.tolist(), strict=True)
-        for name, (white, p, lag1) in zip(("tau1", "tau2"), numbers, strict=True):
+        for joint, name in enumerate(("tau1", "tau2")):
             whiteness[name] = results.WhitenessTest(
-                white=white, p_value=finite(p), lag1_correlation=lag1
+                white=tests.joint_white[joint],
+                p_value=finite(tests.p_value[joint]),
+                lag1_correlation=float(tests.lag1[joint]),
             )
     # worth of each term that the logs chose from, or of those that were given
     terms = [
