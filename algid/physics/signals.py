@@ -173,7 +173,7 @@ def as_expression(value: Expression | Atom | Number) -> Expression:
 
 @dataclass(frozen=True, kw_only=True)
 class Widths:
-    """The widths of friction.
+    """The widths of friction, which models and results have.
 
     Parameters
     ----------
@@ -196,8 +196,8 @@ WIDTHS = {one.name: Atom(f"(1 / {one.name.upper()})") for one in fields(Widths)}
 """One over each width, by the width's name."""
 
 
-def widths_of(holder: object) -> dict[str, Any]:
-    """The widths of friction among the attributes of a model, or of what a result says of it."""
+def widths_of(holder: Widths) -> dict[str, Any]:
+    """The widths of friction among the fields of a model, or of what a result says of it."""
     return {name: float(getattr(holder, name)) for name in WIDTHS}
 
 

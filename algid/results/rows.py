@@ -10,7 +10,7 @@ from algid.base.text import ABSENT, digits_of, percent, resolved, significant, u
 from algid.model import PARAMETERS
 
 if TYPE_CHECKING:
-    from algid.results.model import Estimate, Result
+    from algid.results import Estimate, Result
 
 LEAST_ERROR = 0.01
 """Percent of the truth: a smaller error is said to be smaller."""

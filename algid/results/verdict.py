@@ -34,7 +34,7 @@ from algid.options import flag
 from algid.physics.parameters import BODY
 
 if TYPE_CHECKING:
-    from algid.results.model import Estimate, Result, TorquePrediction
+    from algid.results import Estimate, Result, TorquePrediction
 
 LEAST_R2 = 0.9  # below, a tenth of the torque's power is not the model's
 WORST_R2 = 0.5  # below, most of it is not: wrong angles, signs or units, or not this arm
