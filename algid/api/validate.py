@@ -127,9 +127,9 @@ def validate(
     if known is not None:
         notices += read_otherwise(list(map(survey.summary, survey.logs)), known, file)
     doubtful = found.total is None or max(found.total.nrmse) > DOUBTFUL
-    for log in survey.logs:
+    for log, noticed in zip(survey.logs, survey.noticed(doubtful=doubtful), strict=True):
         name = PurePath(log.name).name
-        notices += [one.of(name) for one in survey.notices(log, doubtful=doubtful)]
+        notices += [one.of(name) for one in noticed]
     warnings, lost = tuple(one.sentence for one in notices if not one.note), lossy(notices)
     return replace(found, warnings=warnings, max_nrmse=max_nrmse, judged=judged, data_lost=lost)
 

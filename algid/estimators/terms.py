@@ -99,9 +99,8 @@ class Selection:
 
     `trials` are those of the terms; where the terms were given there are none. `shapes` is the
     model whose friction has the shape that windows give it before any term is chosen; `refuted`
-    says that the first pass with every term leaves more than a sensor's noise, `shrunk` that none
-    was chosen in the end, but every term shrunk. `hold` is the torque's between samples, and `late`
-    how late the logs say it acts where it is not held.
+    says that the first pass with every term leaves more than a sensor's noise. `hold` is the
+    torque's between samples, and `late` how late the logs say it acts where it is not held.
     """
 
     model: Model
@@ -110,7 +109,6 @@ class Selection:
     trials: tuple[TermTrial, ...] = ()
     shapes: Model | None = None
     refuted: bool = False
-    shrunk: bool = False
     hold: Hold = "foh"
     hold_by: Literal["logs", "settings", "parameters"] = "settings"
     late: Lateness | None = None

@@ -13,11 +13,13 @@ from algid.base.names import outside, within
 from algid.base.significance import SURE
 from algid.estimators import robust
 from algid.estimators.body import averaged_over_bodies, with_body
+from algid.estimators.combine import Prior, joined, without
 from algid.estimators.diagnostics import constrained, undriven
+from algid.estimators.elastic import with_rotors
 from algid.estimators.fit import Fit, solved_anew
 from algid.estimators.hold import Hold
 from algid.estimators.misfit import TERM_OF
-from algid.estimators.problem import Problem
+from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.estimators.terms import (
     CHOICE,
     Selection,
@@ -26,8 +28,7 @@ from algid.estimators.terms import (
     select,
 )
 from algid.identification.known import model_of, prior_of
-from algid.identification.passes import long_enough, problem_of
-from algid.identification.recordings import Recordings
+from algid.identification.recordings import Recording, Recordings
 from algid.methods import estimator_of
 from algid.model import (
     COLUMN_NAMES,
@@ -43,6 +44,7 @@ from algid.notices import Notice
 from algid.physics.effort import ELASTIC, absent, without_terms
 from algid.results import Result
 from algid.settings import Settings
+from algid.signals.differences import TorqueShift
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +64,50 @@ class Fitted:
     settings: Settings = field(default_factory=Settings)
     chosen: Selection = field(default_factory=lambda: Selection(Model(), False))
 
+    @property
+    def problem(self) -> Problem:
+        """What the estimator was given but for what is known beforehand."""
+        return problem_of(self.survey, self.settings, self.chosen)
+
+
+def problem_of(
+    survey: Recordings,
+    settings: Settings,
+    chosen: Selection,
+    prior: Prior | None = None,
+) -> Problem:
+    """What an estimator is given to fit the chosen model, beside what is known beforehand.
+
+    Segments have velocities only where they are not observed on the way.
+    """
+    own = settings.velocity == "measured" or settings.luenberger
+    windows = WeakSettings(
+        model=chosen.model,
+        bandwidth=None if own else settings.bandwidth,
+        shift=TorqueShift(chosen.hold == "zoh", settings.delay),
+        estimate_delay=chosen.delay,
+    )
+    if settings.window is not None:
+        windows = replace(windows, window=settings.window)
+
+    def passed(log: Recording) -> Source:
+        if own:
+            return partial(survey.with_velocities, log, settings)
+        return partial(survey.segments, log)
+
+    known = without(prior, absent(settings.effort, chosen.model.names))
+    known = with_rotors(known, chosen.model)
+    if chosen.undetermined is not None and chosen.delay:
+        known = joined(known, chosen.undetermined.prior)
+    return Problem(
+        list(map(passed, survey.unloaded)),
+        list(map(passed, survey.loaded)),
+        windows,
+        settings.lengths,
+        known,
+        survey.progress,
+    )
+
 
 def choose_model(
     survey: Recordings, settings: Settings, earlier: Result | None = None
@@ -73,7 +119,7 @@ def choose_model(
 
     Raises
     ------
-    LogError
+    TooShortError
         If no log is long enough.
     """
     asked = settings.torque_hold
@@ -90,19 +136,18 @@ def choose_model(
     elif not (settings.chooses or by_logs or widths_in(settings.terms)):
         chosen = _given(Model(gravity=settings.gravity), settings.terms)
     else:
-        with long_enough(survey):
-            chosen = _by_first_pass(survey, settings, hold)
-            late = chosen.late
-            by_logs &= not (chosen.refuted and settings.chooses)
-            if by_logs and late is not None:
-                hold, hold_by = late.hold, "logs"
-                if hold == "zoh":
-                    chosen = replace(_by_first_pass(survey, settings, hold), late=late)
-                elif not late.determined and not chosen.delay:
-                    why = _OF_CONTROLLER if late.faster else _OF_HOLD
-                    trials = [trial for trial in chosen.trials if trial.term not in DELAYS]
-                    trials += [TermTrial(term, True, np.nan, why) for term in DELAYS]
-                    chosen = replace(chosen, delay=True, trials=tuple(trials))
+        chosen = _by_first_pass(survey, settings, hold)
+        late = chosen.late
+        by_logs &= not (chosen.refuted and settings.chooses)
+        if by_logs and late is not None:
+            hold, hold_by = late.hold, "logs"
+            if hold == "zoh":
+                chosen = replace(_by_first_pass(survey, settings, hold), late=late)
+            elif not late.determined and not chosen.delay:
+                why = _OF_CONTROLLER if late.faster else _OF_HOLD
+                trials = [trial for trial in chosen.trials if trial.term not in DELAYS]
+                trials += [TermTrial(term, True, np.nan, why) for term in DELAYS]
+                chosen = replace(chosen, delay=True, trials=tuple(trials))
     return replace(chosen, hold=hold, hold_by=hold_by)
 
 
@@ -152,7 +197,7 @@ def run_fit(
 
     Raises
     ------
-    LogError
+    TooShortError
         If no log is long enough.
     """
     survey.begin("choosing terms")
@@ -181,33 +226,32 @@ def run_fit(
                 break
         return fit, chosen
 
-    with long_enough(survey):
-        # why no term is chosen but every one shrunk, if so
-        notes: tuple[Notice, ...] = ()
-        if chosen.refuted and settings.chooses and settings.estimator == "refined":
-            notes = (Notice("REFUTED", numbers={"case": "noise", "kept": "weak"}),)
-        else:
-            fit, chosen = most_likely(chosen, problem)
-            if fit.refuted and _is_doubtful(fit):
-                # wrong lengths refute a likelihood that holds with any others: checks see them by
-                # the one that holds
-                without = settings.but(l1=None, l2=None)
-                free, other = most_likely(chosen, partial(problem_of, survey, without, prior=prior))
-                if not free.refuted:
-                    shared = replace(free.shared, lengths=settings.lengths, body=())
-                    fit, chosen = solved_anew(free, shared, free.prior, None), other
-            if fit.refuted and settings.chooses:
-                notes = fit.notes
-        picked = chosen
-        if notes:
-            fit, chosen = _shrunk(notes, chosen, problem)
-        else:  # the fit has estimated the width of friction's step
-            chosen = replace(chosen, model=fit.shared.model)
-        passive = any(log.origin.reading.passive for log in survey.logs)
-        if settings.estimator == "refined" and passive and not survey.loaded:
-            fit, chosen = _of_motorless(fit, chosen, picked, settings.terms, problem)
-        if fit.estimator == "instruments" and not chosen.shrunk:
-            fit = robust.with_feedback_noted(fit, problem(chosen))
+    # why no term is chosen but every one shrunk, if so
+    notes: tuple[Notice, ...] = ()
+    if chosen.refuted and settings.chooses and settings.estimator == "refined":
+        notes = (Notice("REFUTED", numbers={"case": "noise", "kept": "weak"}),)
+    else:
+        fit, chosen = most_likely(chosen, problem)
+        if fit.refuted and _is_doubtful(fit):
+            # wrong lengths refute a likelihood that holds with any others: checks see them by
+            # the one that holds
+            without = settings.but(l1=None, l2=None)
+            free, other = most_likely(chosen, partial(problem_of, survey, without, prior=prior))
+            if not free.refuted:
+                shared = replace(free.shared, lengths=settings.lengths, body=())
+                fit, chosen = solved_anew(free, shared, free.prior, None), other
+        if fit.refuted and settings.chooses:
+            notes = fit.notes
+    picked = chosen
+    if notes:
+        fit, chosen = _shrunk(notes, chosen, problem)
+    else:  # the fit has estimated the width of friction's step
+        chosen = replace(chosen, model=fit.shared.model)
+    passive = any(log.origin.reading.passive for log in survey.logs)
+    if settings.estimator == "refined" and passive and not survey.loaded:
+        fit, chosen = _of_motorless(fit, chosen, picked, settings.terms, problem)
+    if fit.estimator == "instruments" and fit.shrinkage is None:
+        fit = robust.with_feedback_noted(fit, problem(chosen))
     fit = finished(fit, settings)
     return Fitted(fit, survey, settings.but(torque_hold=chosen.hold), chosen)
 
@@ -288,7 +332,7 @@ def _shrunk(notes: tuple[Notice, ...], chosen: Selection, problem: Given) -> tup
     shrinking = tuple(name for name, term in TERMS.items() if term.spread)
     every = outside(shrinking, ELASTIC if firm else ())
     model = replace(chosen.shapes or chosen.model, terms=every)
-    shrunken = replace(chosen, model=model, shrunk=True, late=None)
+    shrunken = replace(chosen, model=model, late=None)
     if chosen.hold_by == "logs":
         # else by a likelihood that does not hold: a term takes up the delay
         shrunken = replace(shrunken, hold="foh")

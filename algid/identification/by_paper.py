@@ -26,7 +26,6 @@ from algid.estimators.paper import (
 )
 from algid.identification.known import wrong_inertia
 from algid.identification.outcome import started
-from algid.identification.passes import with_velocities
 from algid.identification.recordings import Recording, Recordings
 from algid.identification.series import write_columns
 from algid.methods import settles
@@ -121,7 +120,7 @@ def _estimate(
     # else beside another estimator, whose settings are not its own
     asked = settles(settings.estimator)
     window = (settings.window if asked else None) or STAGE1_WINDOW
-    moving = with_velocities(survey, log, settings)
+    moving = survey.with_velocities(log, settings)
     names: tuple[str, ...]
     if k is None:
         names, file = STAGE1_SERIES, STAGE1_FILE

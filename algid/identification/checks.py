@@ -49,9 +49,8 @@ from algid.estimators.diagnostics import (
 )
 from algid.estimators.fit import Fit, alone
 from algid.estimators.robust import unshrunk
-from algid.identification.by_likelihood import Fitted, finished
+from algid.identification.by_likelihood import Fitted, finished, problem_of
 from algid.identification.known import FAR, contradicting, gain_notes
-from algid.identification.passes import problem_of
 from algid.identification.recordings import Recording
 from algid.identification.series import predictor_of_fit
 from algid.identification.validate import predicted_by
@@ -111,7 +110,7 @@ def exchanged(fit: Fit) -> float | None:
 def _of_passive_joint(found: Fitted) -> Iterator[Notice]:
     """That the equation of a joint that has no motor does not determine k1 … k5."""
     if any(log.origin.reading.passive for log in found.survey.logs):
-        notice = undriven(found.fit, problem_of(found.survey, found.settings, found.chosen))
+        notice = undriven(found.fit, found.problem)
         if notice is not None:
             yield notice
 

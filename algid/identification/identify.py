@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from algid.arm import CONSTANT_NAMES
-from algid.base.errors import SettingError
+from algid.base.errors import LogError, SettingError
 from algid.base.files import refuse_misleading, result_folder, whole_folder
 from algid.base.progress import Progress
 from algid.base.runtime import one_blas_thread
 from algid.estimators.paper import SHORTEST
+from algid.estimators.problem import TooShortError
 from algid.identification.by_paper import run_paper
 from algid.identification.known import (
     contradictions,
@@ -201,6 +202,11 @@ def _identified(
 
     Time series go into `folder`: the paper's always, those of a likelihood where `series` asks for
     them.
+
+    Raises
+    ------
+    LogError
+        If no log is long enough.
     """
     with one_blas_thread():
         if settles(settings.estimator):
@@ -209,7 +215,13 @@ def _identified(
                 known = torque_constants(earlier.result, Model(), "unloaded", earlier.file)
             result = run_paper(survey, settings, known, folder)
         else:
-            result = _by_likelihood(survey, settings, earlier, stated, folder if series else None)
+            try:
+                result = _by_likelihood(
+                    survey, settings, earlier, stated, folder if series else None
+                )
+            except TooShortError as error:
+                names = ", ".join(log.name for log in survey.logs)
+                raise LogError(f"{names}: {error}; record longer") from error
         result = judged(result, survey)
     notices = result.notices
     if earlier is not None:

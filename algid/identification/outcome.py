@@ -349,8 +349,10 @@ def judged(result: Result, survey: Recordings) -> Result:
     down = _pulled_down(fit, len(survey.logs))
     of_logs, other_arms, of_fit = list[Notice](), list[Notice](), result.notices
     truth = survey.logs[0].origin.truth
-    for log, is_down in zip(survey.logs, down, strict=True):
-        for notice in survey.notices(log, doubtful=doubtful):
+    for log, noticed, is_down in zip(
+        survey.logs, survey.noticed(doubtful=doubtful), down, strict=True
+    ):
+        for notice in noticed:
             if not replaced.get(notice.key) and not (is_down and notice.code in _OF_GRAVITY):
                 of_logs.append(notice.of(PurePath(log.name).name))  # the paths stand among the logs
         own = log.origin.truth

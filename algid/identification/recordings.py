@@ -21,15 +21,18 @@ from algid.base.progress import Progress
 from algid.base.runtime import ahead, beside
 from algid.log import Log, Origin
 from algid.notices import Notice, has_code
+from algid.options import flag
 from algid.readers.clock import check_step
 from algid.readers.memory import FrameOrArrays, is_columns
 from algid.results import LogSummary
+from algid.signals.observers import PAPER_POLES, observed
 from algid.signals.segments import Segment, segments
 
 if TYPE_CHECKING:
     from algid.estimators.convention_search import Recorded
     from algid.estimators.saturation import Limit, Saturation
     from algid.profile import Profile
+    from algid.settings import Settings
 
 EXAMINED = 1 << 15
 """Samples at the start of a long log that the named checks look at."""
@@ -236,7 +239,6 @@ class Recordings:
         self.progress = progress
         self._gravity, self._effort = gravity, effort
         self._known: dict[Role, Saturation] = {}
-        self._conventions: dict[Recording, Notice | None] | None = None
         self._room = MOST_KEPT
         self._stage, self._over = "fitting", self.logs
         self._done: dict[Recording, int] = {}
@@ -340,6 +342,25 @@ class Recordings:
             log.kept = tuple(held)
             self._room -= rows
 
+    def with_velocities(self, log: Recording, settings: Settings) -> Iterator[Segment]:
+        """The segments with velocities: measured, or by the paper's observer.
+
+        Raises
+        ------
+        LogError
+            If measured velocities are asked for and the log has none.
+        """
+        if settings.velocity != "measured":
+            yield from observed(self.segments(log), settings.poles or PAPER_POLES)
+            return
+        for segment in self.segments(log):
+            if segment.omega is None:
+                raise LogError(
+                    f"{log.name}: expected velocities omega1, omega2 for {flag('velocity')}="
+                    f"measured, found none; they are observed by {flag('velocity')}=observer"
+                )
+            yield segment
+
     def whole(self, log: Recording) -> Recording:
         """The log, gone over to its end."""
         if log.rows is None:
@@ -347,30 +368,26 @@ class Recordings:
                 pass
         return log
 
-    def notices(self, log: Recording, *, doubtful: bool = True) -> tuple[Notice, ...]:
-        """What was noticed in a log.
+    def noticed(self, *, doubtful: bool = True) -> list[tuple[Notice, ...]]:
+        """What was noticed in each log.
 
         Of several logs of a role the conventions are judged together, and only where what they
         come to is `doubtful`: a fit that holds and obeys physics has no other convention.
         """
         from algid.inspection.conventions import mends
 
-        seen = self.whole(log).notices
-        if self._conventions is None:
-            self._conventions = {}
-            for logs in (self.unloaded, self.loaded) if doubtful else ():
-                known = {
-                    one: (one.origin, one.recorded) for one in logs if one.recorded is not None
-                }
-                if known:
-                    found = mends(list(known.values()), gravity=self._weight(logs[0]) > 0)
-                    self._conventions |= zip(known, found, strict=True)
-        convention = self._conventions.get(log)
-        if convention is None:
-            return seen
-        # what is less precise than the convention
-        of_gravity = ("FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED")
-        return tuple(one for one in seen if one.code not in of_gravity) + (convention,)
+        noticed = {log: self.whole(log).notices for log in self.logs}
+        for logs in (self.unloaded, self.loaded) if doubtful else ():
+            known = {one: (one.origin, one.recorded) for one in logs if one.recorded is not None}
+            if not known:
+                continue
+            found = mends(list(known.values()), gravity=self._weight(logs[0]) > 0)
+            for log, convention in zip(known, found, strict=True):
+                if convention is not None:  # what is of gravity is less precise
+                    of_gravity = ("FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED")
+                    kept = (one for one in noticed[log] if one.code not in of_gravity)
+                    noticed[log] = (*kept, convention)
+        return list(noticed.values())
 
     def summary(self, log: Recording) -> LogSummary:
         """The log as a result names it."""

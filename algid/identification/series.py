@@ -196,12 +196,11 @@ def residual_of(found: Fitted) -> ResidualSums | None:
     None where no log is long enough.
     """
     from algid.estimators import weak
-    from algid.identification.passes import problem_of
 
     fit = found.fit
     if fit.residual:
         return pooled(fit.residual)
-    problem = problem_of(found.survey, found.settings, found.chosen)
+    problem = found.problem
     if fit.delay is not None:
         problem = problem.at(found.chosen.model, fit.delay)
     sums, known = [], predictor_of_fit(found)

@@ -147,7 +147,7 @@ def test_samples_beyond_a_limit_are_counted_over_all_blocks() -> None:
     recording = in_blocks(log, [3000, 7000])
     survey = Recordings([recording])
     list(survey.segments(recording))
-    told = of_codes(survey.notices(recording), "CLIPPED_TORQUE")
+    told = of_codes(survey.noticed()[0], "CLIPPED_TORQUE")
     for one, tau in zip(told, log.tau, strict=True):
         assert one.numbers["count"] == np.count_nonzero(np.abs(tau) >= one.numbers["level"]) > 700
 

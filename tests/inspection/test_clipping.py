@@ -28,7 +28,7 @@ def surveyed(log: Log) -> Recordings:
 
 
 def told(survey: Recordings) -> list[str]:
-    return [one.text for one in of_codes(survey.notices(survey.logs[0]), "CLIPPED_TORQUE")]
+    return [one.text for one in of_codes(survey.noticed()[0], "CLIPPED_TORQUE")]
 
 
 def test_samples_beyond_a_sensor_s_range_are_left_out_and_counted() -> None:
