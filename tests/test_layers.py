@@ -70,7 +70,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "arm arrow criteria errors estimators files inspection log methods model names "
         "notices options physics profile progress readers report results runtime settings signals "
         "significance table4 text",
-        "numpy polars pyarrow",
+        "numpy polars pyarrow scipy",
     ),
     "batches": room(
         "errors files guard identification limits options profile progress readers results "

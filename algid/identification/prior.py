@@ -46,7 +46,7 @@ from algid.arm import CONSTANT_NAMES, Arm, FloatArray
 from algid.base.criteria import SAME_LENGTH, STILL
 from algid.base.errors import ResultError, SettingError
 from algid.base.files import read_text
-from algid.base.names import named_values, outside, places_outside, vector, within
+from algid.base.names import outside, places_outside, vector, within
 from algid.base.significance import LEVEL, chance
 from algid.base.text import counted
 from algid.estimators.combine import likelihood, scaled_pinv
@@ -236,8 +236,8 @@ def read_urdf(path: Path, profile: Profile | None = None) -> Predictor:
     bent = max(abs(arm.delta1), abs(arm.delta2)) > _BESIDE
     terms = ("coulomb",) * any(friction) + ("phases",) * bent
     model = Model(terms, gravity=arm.g)
-    numbers = np.concatenate([arm.constants(), arm.sines(), friction])
-    value = named_values((*CONSTANT_NAMES, *SINES, F1, F2), numbers)
+    numbers = [*arm.phasors(), *friction]
+    value = dict(zip((*CONSTANT_NAMES, *SINES, F1, F2), numbers, strict=True))
     c = vector(model.names, value | dict.fromkeys(absent(profile.effort, model.names), 0.0))
 
     def coefficients(role: Role) -> FloatArray:
@@ -263,13 +263,13 @@ def _arm(robot: ET.Element) -> tuple[Arm, tuple[float, ...]]:
     parent: dict[str, str] = {}
     for one in robot.findall("joint"):
         child, parent_of = _text(one, "child", "link"), _text(one, "parent", "link")
-        lost = [name for name in (child, parent_of) if name not in links or child in joints]
-        if lost:
-            raise ValueError(_ASTRAY.format(lost[0]))
+        for name in (child, parent_of):
+            if name not in links or child in joints:
+                raise ValueError(_ASTRAY.format(name))
         joints[child], parent[child] = one, parent_of
     kind = {name: _text(one, "", "type") for name, one in joints.items()}
     names = [name for name, word in kind.items() if word != "fixed"]
-    if len(names) != 2 or not {kind[name] for name in names} <= {"revolute", "continuous"}:
+    if len(names) != 2 or not {"fixed", "revolute", "continuous"}.issuperset(kind.values()):
         raise ValueError(f"found {counted(len(names), 'moving joint')}, or not all of them turn")
     # a link's frame in the base's where both angles are 0, and how many of the moving joints it is
     # behind
@@ -368,10 +368,10 @@ def _inertial(link: ET.Element) -> tuple[FloatArray, FloatArray, float]:
 
 def _origin(element: ET.Element, path: str) -> FloatArray:
     """The origin (4, 4) at `path`: roll, pitch, yaw about fixed axes, and its place."""
-    frame, axes = np.eye(4), np.eye(3)
-    for axis, angle in zip(axes, _numbers(element, path, "rpy", "0 0 0", 3), strict=True):
-        c, s = math.cos(angle), math.sin(angle)  # Rodrigues' formula
-        turn = c * axes + s * np.cross(axes, axis) + (1 - c) * np.outer(axis, axis)
-        frame[:3, :3] = turn @ frame[:3, :3]
+    from scipy.spatial.transform import Rotation
+
+    frame = np.eye(4)
+    turned = Rotation.from_euler("xyz", _numbers(element, path, "rpy", "0 0 0", 3))
+    frame[:3, :3] = turned.as_matrix()
     frame[:3, 3] = _numbers(element, path, "xyz", "0 0 0", 3)
     return frame
