@@ -25,7 +25,7 @@ horizontal plane.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from math import remainder, sqrt, tau
 from pathlib import PurePath
@@ -33,7 +33,8 @@ from pathlib import PurePath
 import numpy as np
 
 from algid import results
-from algid.base.names import within
+from algid.arm import CONSTANT_NAMES
+from algid.base.names import named_values, within
 from algid.base.significance import NORMAL, SURE, chance
 from algid.estimators.combine import of_kind
 from algid.estimators.diagnostics import (
@@ -55,7 +56,6 @@ from algid.identification.recordings import Recording
 from algid.identification.series import predictor_of_fit
 from algid.identification.validate import predicted_by
 from algid.model import (
-    EVERY_TERM,
     FIRST_TERMS,
     K1,
     K2,
@@ -70,6 +70,7 @@ from algid.model import (
     SINES,
     names_of,
     phasor,
+    phasor_of,
     terms_named,
 )
 from algid.notices import Notice, Remedy, has_code
@@ -386,8 +387,9 @@ LONGEST, BOTH_LONG = 5.0, 2.0
 NO_DAMPING = 0.02  # of critical damping: less than any joint's friction
 NO_ARM = 0.1  # of the loaded arm's inertia: less than any unloaded arm's
 
-Known = dict[str, tuple[float, float]]
-"""Values by name, and how far each may be off: `SURE` standard deviations."""
+Sizes = Mapping[str, tuple[float, float]]
+"""Size of each constant, with its sine part where it has one, and how far it may be off: `SURE`
+standard deviations. Both are 0 without a column."""
 
 
 def of_effort(fit: Fit, settings: Settings) -> tuple[Settings, list[Notice]]:
@@ -396,12 +398,15 @@ def of_effort(fit: Fit, settings: Settings) -> tuple[Settings, list[Notice]]:
     With it notices of what was not asked for.
     """
     shown, notices = settings, list[Notice]()
-    unloaded, loaded = _own(fit, False), _own(fit, True)
+    unloaded, loaded = (
+        _sizes(alone(fit.shared, logs)) if (logs := of_kind(fit.logs, kind)) else None
+        for kind in (False, True)
+    )
     gravity, l1 = fit.shared.model.gravity, fit.shared.lengths.get("l1")
     if gravity > 0:
         # an arm with coupling but no weight, by unloaded logs alone, or else by the fit
-        arm = unloaded or _of_fit(fit)
-        (k1, off1), (k2, off2), (k4, off4) = (_size(arm, name) for name in MOMENTS)
+        arm = unloaded or _sizes(fit)
+        (k1, off1), (k2, off2), (k4, off4) = map(arm.__getitem__, MOMENTS)
         weightless = max(k2 + off2, k4 + off4) < gravity * k1 / (l1 or BOTH_LONG)
         if shown.effort is None and k1 > off1 and weightless:
             shown = shown.but(effort="gravity-compensated")
@@ -422,7 +427,7 @@ def of_effort(fit: Fit, settings: Settings) -> tuple[Settings, list[Notice]]:
             remedies.append(Remedy({"gravity": 0}, "for a horizontal plane"))
         numbers = {"case": case}
         notices.append(Notice("GRAVITY_COMPENSATED", numbers=numbers, remedies=tuple(remedies)))
-    elif _external(unloaded, loaded):
+    elif unloaded and loaded and _external(unloaded, loaded):
         notices.append(Notice("EXTERNAL_EFFORT", remedies=(Remedy({"effort": "external"}),)))
     elif _without_friction(fit):
         compensated = Remedy({"effort": "friction-compensated"}, "for such a driver")
@@ -430,43 +435,25 @@ def of_effort(fit: Fit, settings: Settings) -> tuple[Settings, list[Notice]]:
     return shown, notices
 
 
-def _external(unloaded: Known, loaded: Known) -> bool:
+def _external(unloaded: Sizes, loaded: Sizes) -> bool:
     """Whether unloaded logs have nothing of an arm in their torque, and loaded ones do."""
-    if not (unloaded and loaded) or not loaded[K5][0] > loaded[K5][1]:
-        return False
-    none = [abs(unloaded[k][0]) + unloaded[k][1] < NO_ARM * loaded[k][0] for k in (K3, K5)]
-    return all(none)
+    size, off = loaded[K5]
+    return size > off and all(sum(unloaded[k]) < NO_ARM * loaded[k][0] for k in (K3, K5))
 
 
 def _without_friction(fit: Fit) -> bool:
-    dry = names_of(terms_named(within(FRICTION[1:], EVERY_TERM)))
+    dry = names_of(terms_named(FRICTION[1:]))
     if fit.absent or (fit.shrinkage is None and set(dry) & set(fit.names)):
         return False
-    known = _of_fit(fit)
-    k3, k4, k5 = (_size(known, name)[0] for name in (K3, K4, K5))
+    known = _sizes(fit)
+    (k3, _), (k4, _), (k5, _) = map(known.__getitem__, (K3, K4, K5))
     most = NO_DAMPING * np.sqrt((k3 + k5) * k4)
-    sizes = [_size(known, name) for name in (K6, K7)]
-    return all(value < off and value + off < most for value, off in sizes)
+    return all(size < off and size + off < most for size, off in (known[K6], known[K7]))
 
 
-def _size(known: Known, name: str) -> tuple[float, float]:
-    """Size of a constant, with its sine part where it has one, and how far it may be off.
-
-    Both are 0 without a column.
-    """
-    value, off = known.get(name, (0.0, 0.0))
-    across, _ = known.get(SINE_OF.get(name, ""), (0.0, 0.0))
-    return float(np.hypot(value, across)), off
-
-
-def _of_fit(fit: Fit) -> Known:
-    """The fit's value of each parameter, and how far it may be off even where it is open."""
-    spreads = SURE * np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    pairs = zip(fit.values.tolist(), spreads.tolist(), strict=True)
-    return dict(zip(fit.names, pairs, strict=True))
-
-
-def _own(fit: Fit, loaded: bool) -> Known:
-    """Each coefficient by the logs of one kind alone; empty without such a log."""
-    logs = of_kind(fit.logs, loaded)
-    return _of_fit(alone(fit.shared, logs)) if logs else {}
+def _sizes(fit: Fit) -> Sizes:
+    """Of a fit, also where it leaves a constant open."""
+    value = named_values(fit.names, fit.values)
+    offs = named_values(fit.names, SURE * np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)))
+    known = {name: (abs(phasor_of(value, name)), off) for name, off in offs.items()}
+    return dict.fromkeys(CONSTANT_NAMES, (0.0, 0.0)) | known

@@ -178,15 +178,12 @@ def validate(known: Predictor, survey: Recordings, *, simulate: bool = False) ->
     ResultError
         If a parameter that the prediction needs has no estimate.
     """
-    predictions, total = dict[str, TorquePrediction | None](), NOTHING
+    scored = list(scores(known, survey))
+    predictions = {log.name: prediction(one) for log, one in zip(survey.logs, scored, strict=True)}
     simulated: dict[str, FloatArray] = {}
-    for log, one in zip(survey.logs, scores(known, survey), strict=True):
-        predictions[log.name] = prediction(one)
-        total = total + one
-        if simulate:
-            duration, moving = survey.whole(log).duration, survey.segments(log)
-            c = known.coefficients(log.role)
-            simulated[log.name] = rollouts(known.model, c, moving, duration, known.shift)
+    for log in survey.logs if simulate else ():
+        moving, c = survey.segments(log), known.coefficients(log.role)
+        simulated[log.name] = rollouts(known.model, c, moving, log.duration, known.shift)
     if simulate:
         simulated[EVERY] = np.sum(list(simulated.values()), axis=0)
     simulation = {}
@@ -203,7 +200,7 @@ def validate(known: Predictor, survey: Recordings, *, simulate: bool = False) ->
             }
             for horizon, count, rmse, moved in columns
         ]
-    return Validated(predictions, prediction(total), simulation)
+    return Validated(predictions, prediction(sum(scored, NOTHING)), simulation)
 
 
 def predicted(result: Result, log: LogLike, role: Role, profile: Profile | None) -> pl.DataFrame:
