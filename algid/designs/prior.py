@@ -21,6 +21,7 @@ from algid.identification.known import (
     given_lengths,
     model_of,
     noise_of,
+    values_of,
     with_error_bar,
     wrong_inertia,
 )
@@ -182,10 +183,7 @@ def _of_result(
         numbers = {"case": "terms", "terms": titles}
         doubts = (Notice("NOT_REACHED", numbers=numbers), *doubts)
         model = replace(model, terms=planned)
-    value = {}
-    for name, one in result.estimates.items():
-        if one.estimate is not None:
-            value[name] = one.estimate
+    value = values_of(result)
     exact = () if knowns.payload is None else ("m_p",)
     if knowns.payload is not None:
         if "J_p" in value:

@@ -27,7 +27,13 @@ from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.exports.description import describe
 from algid.exports.formats import ROBOTS, SUFFIXES, takes, written
 from algid.exports.links import Knowns
-from algid.identification.known import covariance_of, model_of, prior_of, with_error_bar
+from algid.identification.known import (
+    covariance_of,
+    model_of,
+    prior_of,
+    values_of,
+    with_error_bar,
+)
 from algid.notices import Notice
 from algid.options import flag
 from algid.results import Result
@@ -61,7 +67,7 @@ def drawn_files(
     arm = prior_of(result, model, file).names
     others = [name for name in result.estimates if name not in (*model.names, *result.loaded)]
     names = (*arm, *with_error_bar(result, others))
-    mean = np.array([result.estimates[name].estimate for name in names], dtype=np.float64)
+    mean = vector(names, values_of(result))
     best = describe(result, file, knowns, links=links)
     covariance = covariance_of(result, names, names)
     size = np.sqrt(np.diag(covariance))

@@ -235,8 +235,8 @@ def run_fit(
         if fit.refuted and _is_doubtful(fit):
             # wrong lengths refute a likelihood that holds with any others: checks see them by
             # the one that holds
-            without = settings.but(l1=None, l2=None)
-            free, other = most_likely(chosen, partial(problem_of, survey, without, prior=prior))
+            unsaid = settings.but(l1=None, l2=None)
+            free, other = most_likely(chosen, partial(problem_of, survey, unsaid, prior=prior))
             if not free.refuted:
                 shared = replace(free.shared, lengths=settings.lengths, body=())
                 fit, chosen = solved_anew(free, shared, free.prior, None), other

@@ -50,10 +50,9 @@ def model_of(result: Result) -> Model:
 
     A result that names none was made with what its settings ask for.
     """
-    settings = Settings.of(result.settings)
-    if result.fit is None or result.fit.model is None:
+    settings, model = Settings.of(result.settings), result.torque_model
+    if model is None:
         return Model(without_delay(settings.terms), settings.gravity)
-    model = result.fit.model
     return Model(tuple(model.terms), settings.gravity, **widths_of(model))
 
 
@@ -96,10 +95,8 @@ def untold(result: Result, model: Model) -> tuple[str, ...]:
 
 def shift_of(result: Result) -> TorqueShift:
     """After how long a logged torque acts: hold, and delay."""
-    settings = Settings.of(result.settings)
-    if result.delay is None:
-        return settings.torque_shift(None)
-    return settings.torque_shift(result.delay.estimate)
+    delay = None if result.delay is None else result.delay.estimate
+    return Settings.of(result.settings).torque_shift(delay)
 
 
 def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
@@ -126,7 +123,7 @@ def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
             f"{file}: the result has no {', '.join(missing)}; use the flags it was made with"
         )
     covariance = result.fit.covariance_of(names)
-    mean = np.array([result.parameters[name].estimate for name in names], dtype=np.float64)
+    mean = vector(names, values_of(result), otherwise=np.nan)
     if not np.isfinite([*covariance, mean]).all():
         raise ResultError(
             f"{file}: the result leaves constants undetermined; identify from more logs first"
@@ -152,9 +149,7 @@ def torque_constants(result: Result, model: Model, role: Role, file: str) -> Flo
     ResultError
         If one of them has no estimate.
     """
-    every = (result.parameters | result.payload).items()
-    known = {name: one.estimate for name, one in every if one.estimate is not None}
-    known |= dict.fromkeys(untold(result, model), 0.0) | given_lengths(result)
+    known = values_of(result) | dict.fromkeys(untold(result, model), 0.0) | given_lengths(result)
     loaded = role == "loaded"
     shared = Shared(model, payload=loaded, body=within(BODY_PARAMETERS, known))
     for name in outside(shared.names, known):
@@ -162,6 +157,12 @@ def torque_constants(result: Result, model: Model, role: Role, file: str) -> Flo
             f"{file}: the result has no {name}; identify it from logs that determine it"
         )
     return shared.coefficients(vector(shared.names, known), loaded)
+
+
+def values_of(result: Result) -> dict[str, float]:
+    """The estimates of a result by name, without those that its logs leave open."""
+    every = result.estimates.items()
+    return {name: one.estimate for name, one in every if one.estimate is not None}
 
 
 def given_lengths(result: Result) -> dict[str, float]:

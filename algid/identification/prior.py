@@ -52,7 +52,7 @@ from algid.base.text import counted
 from algid.estimators.combine import likelihood, scaled_pinv
 from algid.estimators.fit import Fit
 from algid.estimators.identifiability import SHARE, open_directions
-from algid.identification.known import covariance_of, with_error_bar
+from algid.identification.known import covariance_of, values_of, with_error_bar
 from algid.identification.recordings import Role
 from algid.identification.series import Predictor
 from algid.model import F1, F2, RIGID, SINES, UNITS, Model
@@ -107,7 +107,7 @@ def statement_of(settings: Settings) -> Statement | None:
     names = with_error_bar(result, RIGID)
     if not names:
         raise ResultError(f"{file}: the result has no error bars of k1 … k5; give another one")
-    mean = np.array([result.parameters[name].estimate for name in names], dtype=np.float64)
+    mean = vector(names, values_of(result))
     return Statement(file, names, mean, covariance_of(result, names, names))
 
 

@@ -26,6 +26,8 @@ from algid.identification.known import (
     payload_length,
     prior_of,
     shift_of,
+    untold,
+    values_of,
     with_error_bar,
 )
 from algid.model import K3, K6, K7, SINES, TERMS, Model
@@ -138,12 +140,9 @@ def arm_of(result: Result, first: Segment, **given: float) -> tuple[IdentifiedAr
     prior = prior_of(result, model)
     if COULOMB.name not in model.terms:
         model = replace(model, terms=model.terms + (COULOMB.name,))
-    estimates = {
-        name: one.estimate for name, one in result.payload.items() if one.estimate is not None
-    }
-    m_p, J = estimates.get("m_p", 0.0), estimates.get("J_p", 0.0)
     stated = {name: result.settings[name] for name in LENGTHS if result.settings.get(name)}
-    value = dict(zip(prior.names, prior.mean, strict=True)) | estimates | stated | given
+    value = values_of(result) | dict.fromkeys(untold(result, model), 0.0) | stated | given
+    m_p, J = value.get("m_p", 0.0), value.get("J_p", 0.0)
     value |= {"m_p": 1.0, "J_p": max(J, 0.0) / m_p if m_p > 0 else 0.0}
     if set(SINES).isdisjoint(model.names):
         value["y_p"] = 0.0
