@@ -236,21 +236,14 @@ def noise_for(
     SettingError
         Where none is known.
     """
-    measured = prior.noise
-    if log is not None:
-        measured = first_guess(log.theta, log.tau)
-    levels = {}
-    for option, level, name in (
-        ("position_noise", position, "theta"),
-        ("torque_noise", torque, "tau"),
-    ):
-        if level is not None:
-            levels[name] = np.full(2, level)
-        elif measured is not None and np.all(getattr(measured, name) > 0):
-            levels[name] = getattr(measured, name)
-        else:
+    measured = prior.noise if log is None else first_guess(log.theta, log.tau)
+    stated, levels = {"position_noise": position, "torque_noise": torque}, []
+    for (option, level), known in zip(stated.items(), measured or np.zeros((2, 2)), strict=True):
+        found = known if level is None else np.full(2, level)
+        if not np.all(found > 0):
             raise SettingError(
                 f"{flag(option)}: {prior.source} does not tell how noisy the sensors are; give it, "
                 f"or {flag('noise_from')}=LOG"
             )
-    return NoiseLevels(**levels)
+        levels.append(found)
+    return NoiseLevels(*levels)

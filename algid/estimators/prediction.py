@@ -33,7 +33,7 @@ from algid.estimators.elastic import flexed
 from algid.estimators.fit import Fit
 from algid.estimators.problem import Source
 from algid.model import F1, F2, Model, Motion, advanced, inertia, partials, regressor
-from algid.signals.differences import AT_ONCE, TorqueShift, weighted
+from algid.signals.differences import AT_ONCE, TorqueShift
 from algid.signals.filters import butterworth, correlate, smoother
 from algid.signals.segments import Segment, pieces
 
@@ -141,7 +141,7 @@ def motion_of(theta: FloatArray, dt: float) -> Motion:
     theta = butterworth(theta, dt, min(MOTION, 0.45 / dt))
     rates = []
     for weights in (_SLOPE / dt, _BEND / dt**2):
-        rates.append(np.pad(weighted(theta, weights), ((0, 0), (2, 2)), mode="edge"))
+        rates.append(np.pad(correlate(theta, weights), ((0, 0), (2, 2)), mode="edge"))
     return Motion(theta, *rates)
 
 

@@ -36,8 +36,8 @@ from algid.arm import FloatArray
 from algid.base.compiled import lapack
 from algid.estimators.elastic import flexed, with_bends
 from algid.model import Model, Motion, partials, regressor, sensitivity, torque
-from algid.signals.differences import POINTS, Stencil, weighted
-from algid.signals.filters import recursion, smoothed
+from algid.signals.differences import POINTS, Stencil
+from algid.signals.filters import correlate, recursion, smoothed
 from algid.signals.segments import Segment
 
 _SMOOTHING = 40.0  # Hz: arms move slower; of the trajectory at which a piece is first linearised
@@ -79,7 +79,7 @@ class Linearised:
 def smeared(rows: FloatArray, taps: FloatArray) -> FloatArray:
     """F of torque noise (..., n), zero beyond its ends; Fᵀ by the taps from behind."""
     reach = taps.size // 2
-    return weighted(np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(reach, reach)]), taps)
+    return correlate(np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(reach, reach)]), taps)
 
 
 def whiten(factor: FloatArray, rows: FloatArray) -> FloatArray:

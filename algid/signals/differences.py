@@ -24,7 +24,7 @@ from math import factorial, floor
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.signals.filters import reflected
+from algid.signals.filters import correlate, reflected
 
 POINTS = 9
 _HALF = POINTS // 2
@@ -110,7 +110,7 @@ class Stencil:
         The ends of two samples or more go on by reflection.
         """
         reach = self.taps.size // 2
-        return weighted(reflected(tau, reach), self.taps) if reach else tau
+        return correlate(reflected(tau, reach), self.taps) if reach else tau
 
     def torques(self, length: int) -> slice:
         """Torque samples among `length` whose stencil lies within the `length` angles."""
@@ -126,22 +126,12 @@ class Stencil:
         around = x[:, first : torques.stop + self.whole + _HALF]
         result = np.empty((3, 2, max(0, torques.stop - torques.start)))
         for order, weights in enumerate(self.weights):
-            result[order] = weighted(around, weights)
+            result[order] = correlate(around, weights)
         return result
 
 
 _SLOPE = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60
 """First derivative by the samples around one, times dt: sixth order."""
-
-
-def weighted(signal: FloatArray, taps: FloatArray) -> FloatArray:
-    """Sums (..., N - p + 1) of each sample of a signal (..., N) and the next by `taps` (p,)."""
-    n = max(0, signal.shape[-1] - taps.size + 1)
-    result = taps[0] * signal[..., :n]
-    for place, tap in enumerate(taps[1:], start=1):
-        if tap != 0.0:
-            result += tap * signal[..., place : place + n]
-    return result
 
 
 HELD = np.array([1.0, 22.0, 1.0]) / 24
@@ -188,6 +178,6 @@ def integral(signal: FloatArray, dt: float) -> FloatArray:
     steps[..., 0] = 0
     steps[..., 1] = signal[..., :4] @ _EDGE
     steps[..., -1] = signal[..., -4:] @ _EDGE[::-1]
-    steps[..., 2:-1] = weighted(signal, _INNER)
+    steps[..., 2:-1] = correlate(signal, _INNER)
     steps *= dt
     return np.cumsum(steps, axis=-1, out=steps)

@@ -62,15 +62,15 @@ def _support(dt: float, bandwidth: float) -> tuple[FloatArray, FloatArray]:
 
 
 def correlate(x: FloatArray, kernel: FloatArray, step: int = 1) -> FloatArray:
-    """Correlation of each row of x (m, N) with a kernel (K,), where they overlap entirely.
-
-    N is K at least.
+    """Correlation of signals x (..., N) with a kernel (K,), where they overlap entirely.
 
     Returns
     -------
-    (m, (N - K) // step + 1): every `step`-th value of it
+    (..., (N - K) // step + 1): every `step`-th value of it, none where N is below K
     """
-    return np.stack([np.correlate(row, kernel, "valid")[::step] for row in x])
+    if x.shape[-1] < kernel.size:
+        return x[..., :0]
+    return np.apply_along_axis(np.correlate, -1, x, kernel, "valid")[..., ::step]
 
 
 def smoothed(x: FloatArray, dt: float, bandwidth: float) -> FloatArray:

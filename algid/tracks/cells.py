@@ -21,12 +21,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.base.names import names_in, outside
+from algid.base.names import concatenated, names_in, outside, rows_of
 from algid.signals.differences import POINTS
 from algid.signals.segments import Segment, pieces
 from algid.tracks.arm import IdentifiedArm
@@ -74,9 +73,14 @@ class Cells:
         """Time (C,) in s amid each cell."""
         return 0.5 * (self.start + self.end)
 
+    @property
+    def sums(self) -> dict[str, FloatArray]:
+        """What each cell has of its own, by name."""
+        return {name: getattr(self, name) for name in SUMS}
+
     def part(self, first: int, last: int) -> Cells:
         """Cells `first` to `last` - 1."""
-        return replace(self, **{name: getattr(self, name)[first:last] for name in SUMS})
+        return replace(self, **rows_of(self.sums, slice(first, last)))
 
     @property
     def mass(self) -> float:
@@ -100,10 +104,7 @@ SUMS = outside(names_in(fields(Cells)), ("U",))
 
 def joined(parts: Sequence[Cells]) -> Cells:
     """Cells one after another."""
-    sums: dict[str, Any] = {}
-    for name in SUMS:
-        sums[name] = np.concatenate([getattr(part, name) for part in parts])
-    return replace(parts[0], **sums)
+    return replace(parts[0], **concatenated([part.sums for part in parts]))
 
 
 def cells_of(
