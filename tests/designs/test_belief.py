@@ -7,6 +7,7 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.base.errors import SettingError
+from algid.base.significance import SURE
 from algid.designs.belief import Belief, Objective, objective_of
 from algid.estimators.parametrisation import Shared
 from algid.model import Model
@@ -60,6 +61,15 @@ def test_drawn_arms_scatter_as_believed(box: bool) -> None:
     np.testing.assert_allclose(drawn.std(axis=0), std, atol=5 * std.max() / np.sqrt(8000))
     if box:
         assert np.all(np.abs(drawn - one.mean) <= np.abs(one.spread).sum(axis=1))
+    load, Y = one.load(True), np.random.default_rng(4).standard_normal((2, 7, 3))
+    torque = np.einsum("aqn,dq->dan", Y, [one.shared.coefficients(arm, True) for arm in drawn])
+    mean, more, _ = load.largest(Y)
+    np.testing.assert_allclose(torque.mean(axis=0), mean, atol=0.1 * more.max())
+    if box:  # no arm asks for more, and one in a corner for nearly that
+        assert np.all(np.abs(torque - mean) <= more + 1e-9)
+        np.testing.assert_allclose(np.abs(torque - mean).max(axis=0), more, rtol=0.15)
+    else:
+        np.testing.assert_allclose(SURE * torque.std(axis=0), more, rtol=0.05)
     np.testing.assert_array_equal(one.draws(5, 3), one.draws(5, 3))
     assert np.any(one.draws(5, 3) != one.draws(5, 4))
 

@@ -21,7 +21,7 @@ from algid.designs.campaign import Campaign, Planned, plan
 from algid.designs.information import Experiment
 from algid.designs.limits import limits_of, request
 from algid.designs.prior import PriorKnowledge, prior_of
-from algid.designs.write import design_json
+from algid.designs.write import design_json, verdict
 from algid.estimators.whitening import NoiseLevels
 from algid.notices import Notice
 from algid.readers import read_log
@@ -99,6 +99,9 @@ def test_what_is_asked_for_is_what_becomes_certain(design: Planned) -> None:
     place = design.names.index("m_p")
     assert payload.relative[place] < 0.9 * design.relative[place]
     assert payload.largest == payload.relative[place]
+    assert "m_p is the least certain" in verdict(payload).headline
+    (lost,) = verdict(replace(payload, std=1e3 * payload.std)).reasons
+    assert "no motion within the limits determines m_p: widen" in str(lost)
 
 
 def test_the_json_holds_what_decides_and_what_is_predicted(design: Planned) -> None:
@@ -119,7 +122,8 @@ def test_the_json_holds_what_decides_and_what_is_predicted(design: Planned) -> N
     decided = {
         "prior": "arm.algid", "command": "algid design arm.algid", "drive": "position",
         "duration": 2.0, "rate": 500.0, "seed": 0, "gravity": 9.81,
-        "version": __version__, "joints": ["a", "b"], "runs": {"unloaded": 1, "loaded": 1},
+        "version": __version__, "schema_version": 2, "joints": ["a", "b"],
+        "runs": {"unloaded": 1, "loaded": 1},
         "noise": {"theta1": 1e-3, "theta2": 1e-3, "tau1": 1e-2, "tau2": 1e-2},
         "start": design.motion.theta[:, 0].tolist(),
     }  # fmt: skip
@@ -317,10 +321,14 @@ REFUSED = [
         ["case1", *SENSORS, *LIMITS, "--set", "tip_height=5"],
         "--set tip_height: expected less than the arm's reach",
     ),
-    (["case1", *SENSORS, *LIMITS, "--for", "k9"], "--for k9: expected some of k1"),
+    (["case1", *SENSORS, *LIMITS, "--for", "k1, k9"], "--for k9: expected some of k1"),
     (["case1", *SENSORS, *LIMITS, "--runs", "1,0", "--for", "m_p"], "there are no loaded runs"),
     (["case1", *SENSORS, *LIMITS, "--joints", "one"], "tuple should have at least 2 items"),
     (["nocase", *SENSORS, *LIMITS], "no such case"),
+    (
+        ["case1", *SENSORS, "--range", "inf", "--speed", "inf", "--torque", "inf"],
+        "--range: without any limit no motion is the best",
+    ),
 ]
 
 

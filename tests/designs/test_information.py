@@ -4,6 +4,8 @@ differences.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -76,7 +78,27 @@ def test_each_run_counts_by_itself_and_each_part_of_a_motion_too() -> None:
         for runs in ((1, 0), (0, 1), (3, 1))
     )
     np.testing.assert_allclose(both.S, 3 * bare.S + burdened.S, rtol=1e-9)
-    np.testing.assert_allclose(both.parts(40).sum(axis=0), both.S, rtol=1e-9)
+    parts = both.parts(40)
+    np.testing.assert_allclose(parts.sum(axis=0), both.S, rtol=1e-9)
+    assert len(parts) == 5
+    assert np.all(np.trace(parts / np.diag(both.S), axis1=1, axis2=2) > 0)
+
+
+def test_a_delay_is_told_by_how_steep_the_torque_is() -> None:
+    belief, rate = belief_of("case1"), 500.0
+    shared = replace(belief.shared, delay=True)
+    beta = np.insert(belief.mean, len(shared.model.names), 0.0)
+    t = middles(FAMILY.duration, rate)
+    motion = motion_at(drawn(1), t)
+    exact = NoiseLevels(np.full(2, 1e-12), NOISE.tau)
+    slopes = Sensitivities(shared.model, motion, rate)
+    found = Information(Experiment(shared, (1, 0), exact, rate), beta, slopes).S
+    k = shared.coefficients(beta, False)[: len(shared.model.names)]
+    tau = inverse_dynamics(k, motion.theta, motion.omega, motion.alpha)
+    steep = (tau[:, 2:] - tau[:, :-2]) * rate / 2
+    place = shared.names.index("delay")
+    expected = np.sum((steep / NOISE.tau[:, None]) ** 2)
+    assert found[place, place] == pytest.approx(expected, rel=0.01)
 
 
 def test_gradient_by_the_motion_is_that_of_differences() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import algid
 from algid.designs.belief import Belief, objective_of
-from algid.designs.prior import PriorKnowledge, prior_of
+from algid.designs.prior import PriorKnowledge, noise_for, prior_of
 from algid.results import Result, write_result
 from algid.settings import Settings
 from algid.synth.sensors import Sensors
@@ -52,3 +52,17 @@ def test_a_delay_that_was_estimated_is_planned_for_and_no_aim(tmp_path: Path) ->
     assert not objective_of(sure, None, "it").wanted[place]
     assert objective_of(sure, ["delay"], "it").wanted[place]
     assert belief.load(False).c.size == len(belief.shared.model.names)
+
+
+def test_noise_is_what_is_given_else_of_a_log_else_of_the_results_logs(
+    result: Result, tmp_path: Path
+) -> None:
+    prior = prior_of(saved(result, tmp_path), None, PriorKnowledge())
+    log, _ = algid.synthesise(
+        "case1", duration=2.0, rate=500.0, torque="wide", sensors=Sensors(3e-3, 3e-2)
+    )
+    for one, theta, tau in ((None, 1e-3, 1e-2), (log, 3e-3, 3e-2)):
+        found = noise_for(prior, None, None, one)
+        np.testing.assert_allclose(found.theta, theta, rtol=0.2)
+        np.testing.assert_allclose(found.tau, tau, rtol=0.2)
+        assert noise_for(prior, 7.0, None, one).theta.tolist() == [7.0, 7.0]
