@@ -152,6 +152,11 @@ def test_a_track_is_read_back_as_it_was(result: TrackResult, tmp_path: Path) -> 
     page = Page((folder / "report.html").read_text(encoding="utf-8"))
     names = ["Payload by stretch", "Changes", "Fit", "Logs", "Channels", "Settings", "Provenance"]
     assert list(page.tables) == names
+    noise = page.tables["Fit"][1][1][1]
+    assert float(noise) == pytest.approx(result.track.colour**0.5, rel=0.01)
+    assert "<title>picking.mcap · algid</title>" in page.text
+    masses = [f"{one.m_p:.4g} ± {one.std:.2g}" for one in result.track.stretches]
+    assert f"by stretch {', '.join(masses)} kg" in repr(result)
     for words in ("Payload in time", "Data quality", "Settings and provenance", "arm of arm.algid"):
         assert words in page.prose
     again = read_track(folder)

@@ -65,14 +65,14 @@ def track(masses: list[float], std: float = 0.001, **changes: object) -> TrackRe
 
 
 def test_changes_have_their_sign_and_the_nearest_true_moment() -> None:
-    made = track([0.1, 0.35, 0.2], schedule=((0.0, 0.1), (1.02, 0.35), (1.9, 0.2)))
+    made = track([0.1, 0.35, 0.2], schedule=((0.0, 0.1), (0.98, 0.35), (1.9, 0.2)))
     rows = change_table(made).rows
     assert [row[2] for row in rows] == ["+0.2500", "-0.1500"]
     between = [("1.000", "[0.900, 1.100]"), ("2.000", "[1.900, 2.100]")]
     assert [(row[1], row[4]) for row in rows] == between
     # what the arm held at the start is no change
     assert [row[5] for row in rows] == [
-        "1.020",
+        "0.980",
         "1.900",
     ]
     heads = change_table(track([0.1, 0.2])).heads
@@ -102,6 +102,12 @@ def test_a_long_track_keeps_its_extremes_and_breaks_at_holes() -> None:
     ends = np.concatenate([typed(one["y"]) for one in named(data, "its 95 % band")])
     assert ends.max() == pytest.approx(0.9 + 1.96 * 0.001, rel=1e-4)
     assert ends.min() == pytest.approx(-0.4 - 1.96 * 0.001, rel=1e-4)
+    known = track([0.1, 0.35], schedule=((0.0, 0.1), (1.1, 0.4)))
+    (true,) = named(payload_figure(known).data, "true schedule")
+    np.testing.assert_allclose(typed(true["x"]), [0.0, 0.0, 1.1, 2.0], rtol=1e-6)
+    np.testing.assert_allclose(typed(true["y"]), [0.0, 0.1, 0.4, 0.4], rtol=1e-6)
+    low, high = payload_figure(known).layout["yaxis"]["range"]
+    assert -0.05 < low < 0.0 < 0.4 < high < 0.45  # all that is drawn, and little more
     still = track([0.1])
     t = still.track.t + np.where(still.track.t > 0.5, 3.0, 0.0)
     holey = replace(still, track=replace(still.track, t=t))
