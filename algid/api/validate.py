@@ -111,7 +111,7 @@ def validate(
             raise SettingError(
                 f"validate: expected a log, found none; give one, or {flag('max_error')}"
             )
-        return Validated(judged=judged)
+        return Validated({}, None, {}, judged=judged)
     known = None if earlier is None else opened(earlier)
     if known is None:
         model = read_urdf(Path(file), own)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -96,9 +96,9 @@ class Validated:
     data_lost : whether samples of a log are missing
     """
 
-    logs: Mapping[str, TorquePrediction | None] = field(default_factory=dict)
-    total: TorquePrediction | None = None
-    simulation: Mapping[str, list[dict[str, Any]]] = field(default_factory=dict)
+    logs: Mapping[str, TorquePrediction | None]
+    total: TorquePrediction | None
+    simulation: Mapping[str, list[dict[str, Any]]]
     warnings: tuple[str, ...] = ()
     max_nrmse: float | None = None
     judged: tuple[Judged, ...] = ()
