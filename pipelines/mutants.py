@@ -46,7 +46,9 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "estimators": ("estimators", "identification/test_validate.py", *GOLDEN),
     "exports": ("exports",),
     "fleet": ("fleet",),
-    "identification": ("identification", *GOLDEN),
+    "identification": (
+        "identification", "cli/test_commands.py", "designs/test_believed.py", *GOLDEN,
+    ),
     "inspection": ("inspection", "identification/test_efforts.py"),
     "model": ("estimators/test_model.py", *GOLDEN),
     "notices": ("test_notices.py", "test_check.py", *FRONT),

@@ -40,10 +40,11 @@ def fit_of(
     terms: tuple[str, ...] = (),
     lengths: dict[str, float] | None = None,
     payload: bool = True,
+    gravity: float = 9.81,
     **changes: Any,
 ) -> Fit:
     """The first case's arm with its payload, each standard deviation a hundredth of its value."""
-    shared = Shared(Model(terms), payload=payload, lengths=lengths or {})
+    shared = Shared(Model(terms, gravity), payload=payload, lengths=lengths or {})
     known = dict(zip((f"k{n}" for n in range(1, 8)), K.tolist(), strict=True))
     known |= {"m_p": CASE.payload, "l1": CASE.arm.l1, "l2": CASE.arm.l2}
     values = np.array([known.get(name, 0.1) for name in shared.names])

@@ -5,15 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import algid
+from algid.identification.by_likelihood import run_fit
+from algid.identification.outcome import judged, outcome_of
+from algid.identification.recordings import Recordings, open_source
 from algid.log import Log
+from algid.notices import Notice, has_code
+from algid.settings import Settings
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 from tests.golden.scenes import ARM, geared, log_of, times
+from tests.inspection.test_checks import moving_log
 
 
 @cache
@@ -45,8 +52,9 @@ def test_gravity_that_is_turned_by_the_final_fit_fails_and_names_the_offset(
     accepted = algid.identify(path, report=False, accept=("WRONG_ZERO",))
     assert accepted.verdict.grade == "reservations"
     assert accepted.complete
-    stated = algid.identify(path, report=False, zero="horizontal")
-    assert not stated.verdict.failed
+    said: list[dict[str, Any]] = [{"zero": "horizontal"}, {"offsets": (0.0, 0.0)}]
+    for stated in (*said, {"theta1": {"offset": 0.0}}):
+        assert not algid.identify(path, report=False, estimator="weak", **stated).verdict.failed
 
 
 def test_a_base_that_is_tilted_a_little_stays_a_phase(tmp_path: Path) -> None:
@@ -88,3 +96,23 @@ def test_a_broken_bound_fails_unless_it_is_accepted(tmp_path: Path) -> None:
     accepted = algid.identify(path, report=False, accept=accept)
     assert accepted.verdict.grade == "reservations"
     assert "BROKEN_BOUND" in {one.code for one in accepted.verdict.reasons}
+
+
+def test_a_convention_that_is_wrong_in_several_logs_fails_with_what_mends_them() -> None:
+    log = moving_log(4000)
+    swapped = replace(log, theta=log.theta[::-1].copy(), tau=log.tau[::-1].copy(), omega=None)
+    halves = [swapped.part(0, 2000), swapped.part(2000, 4000)]
+    found = algid.identify(halves, estimator="weak", model="plain")
+    (reason,) = found.verdict.reasons
+    assert (found.verdict.grade, reason.code) == ("failed", "WRONG_CONVENTION")
+    assert reason.remedy.settings["theta1.source"] == "theta2"
+
+
+@pytest.mark.parametrize(("model", "stands"), [("auto", False), ("plain", True)])
+def test_a_fit_that_chose_its_terms_has_the_last_word_on_gravity(model: str, stands: bool) -> None:
+    """What one log's check says of it is passed over: a wrong zero would show in the sine parts."""
+    log = open_source(moving_log(3000), "unloaded")
+    log.notices += (Notice("FLIPPED_SIGN", numbers={"weight": -1.0}),)
+    survey = Recordings([log])
+    fit = run_fit(survey, Settings(estimator="weak", model=model))
+    assert has_code(judged(outcome_of(fit), survey).notices, "FLIPPED_SIGN") is stands

@@ -13,9 +13,12 @@ from algid.arm import FloatArray
 from algid.base.errors import AlgidError, LogError
 from algid.estimators.convention_search import Recorded, judge_together
 from algid.identification.identify import identify
+from algid.identification.recordings import Recordings, open_source
 from algid.log import Log, Origin
 from algid.profile import Profile
 from algid.settings import Settings
+from algid.signals.observers import observed
+from algid.signals.segments import segments
 from algid.writers import write_log
 from pipelines import false_alarms
 
@@ -74,6 +77,15 @@ def test_velocities_that_an_estimator_cannot_have_are_refused(
     with pytest.raises(AlgidError) as refused:
         identify(log_of(*moving(100, 10)), settings=Settings().but(**settings), report=False)
     assert str(refused.value) == said
+
+
+def test_the_observer_has_the_poles_that_are_asked_for() -> None:
+    log, poles = log_of(*moving(100, 2)), (-9.0, -9.5, -10.0, -20.0, -21.0, -22.0)
+    source = open_source(log, "unloaded")
+    settings = Settings(estimator="paper", poles=poles)
+    seen = Recordings([source]).with_velocities(source, settings)
+    for one, alone in zip(seen, observed(segments([log]), poles), strict=True):
+        np.testing.assert_array_equal(one.omega, alone.omega)
 
 
 @pytest.mark.parametrize("spike", [1e6, 1e29])

@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 
 from algid.arm import CONSTANT_NAMES, FloatArray
+from algid.estimators.hold import Lateness
+from algid.estimators.terms import Selection
+from algid.identification.by_likelihood import problem_of
 from algid.identification.identify import identify
+from algid.identification.recordings import Recordings
 from algid.log import Log
+from algid.model import Model
 from algid.settings import Settings
 from algid.synth.excitation import SampledTorque, wide_multi_sine
 from algid.synth.simulator import simulate
@@ -82,3 +87,14 @@ def test_a_slow_log_of_a_faster_controller_leaves_open_how_late_it_acts() -> Non
     assert abs(off[CONSTANT_NAMES.index("k6")]) < FARTHEST
     told = identify(log, settings=Settings(torque_hold="foh"), report=False)
     assert abs(distances(told, here.arm.constants())[5]) > 2
+
+
+def test_an_estimator_is_given_what_is_asked_for_and_what_is_known() -> None:
+    """A compensated torque has no weight, also where its delay is left open."""
+    late = Lateness(late=5e-4, std=1e-3, half=5e-4)
+    chosen = Selection(Model(), True, late=late, hold_by="logs")
+    asked = Settings(bandwidth=12.0, effort="gravity-compensated")
+    given = problem_of(Recordings(()), asked, chosen)
+    assert given.settings.bandwidth == 12.0
+    assert given.prior is not None
+    assert (given.prior.names, given.prior.absent) == (("k2", "k4", "delay"), ("k2", "k4"))

@@ -27,7 +27,8 @@ from algid.synth.sensors import Sensors
 from algid.synth.simulator import simulate
 from pipelines.accuracy_scenes import random_arm
 from pipelines.saturation import log_of
-from tests.inspection.test_checks import noticed
+from tests.inspection.test_checks import K as ARM
+from tests.inspection.test_checks import moving_log, noticed
 from tests.intervals import distances, holding
 
 PAPER = Settings(estimator="paper")
@@ -51,6 +52,17 @@ def test_paper_observer_and_poles_stay_within_the_paper_s_own_bound() -> None:
         errors = {row.parameter: row.error_percent for row in result.table4}
         assert len(errors) == 12
         assert all(error is not None and error <= 0.6826 for error in errors.values()), errors
+
+
+@pytest.mark.parametrize(("share", "status"), [(0.9, Status.OK), (1.1, Status.IMPLAUSIBLE)])
+def test_constants_that_no_arm_has_are_implausible_by_the_paper_too(
+    share: float, status: Status
+) -> None:
+    """Eq. (2): det M = k3 k5 − k1² with joint 2 turned by half a turn."""
+    k = ARM.copy()
+    k[0] = share * np.sqrt(k[2] * k[4])
+    found = identify(moving_log(3000, k=k), settings=PAPER)
+    assert {one.status for one in found.parameters.values()} == {status}
 
 
 def test_a_result_says_what_the_simulator_knows(noisy: tuple[Log, Log]) -> None:
@@ -82,12 +94,13 @@ def test_a_result_says_what_the_simulator_knows(noisy: tuple[Log, Log]) -> None:
 def test_folder_holds_schema_valid_result_and_flat_series(
     tmp_path: Path, wide: tuple[Log, Log]
 ) -> None:
-    result = identify(*wide, PAPER, out=tmp_path)
+    result = identify(*wide, PAPER, profile=Profile(offsets=(0.0, 0.0)), out=tmp_path)
     folder = tmp_path / "case1-unloaded.algid"
     content = json.loads((folder / "result.json").read_text())
     jsonschema.validate(content, Result.model_json_schema(mode="serialization"))
     assert content["schema_version"] == 4
     assert read_result(folder) == result
+    assert identify(None, wide[1], PAPER, parameters=folder).payload == result.payload
     series = pl.read_parquet(folder / "estimates.parquet")
     assert series.columns[0] == "t"
     assert set(series.columns) >= {f"k{i}" for i in range(1, 8)} | {"condition", "k7_condition"}
@@ -256,9 +269,11 @@ def test_a_log_too_short_beside_a_good_one_still_gives_a_report(tmp_path: Path) 
     short = replace(
         log, stamp_ns=log.stamp_ns[:30], theta=log.theta[:, :30], tau=log.tau[:, :30], omega=None
     )
+    told = list[tuple[str, int, int]]()
     result = identify(
-        [log, short], settings=Settings(estimator="weak", model="plain"), out=tmp_path, name="both"
+        [log, short], settings=WEAK, out=tmp_path, name="both", progress=lambda *x: told.append(x)
     )
+    assert told.index(("report", 0, 0)) < told.index(("report", 2031, 2031))
     assert result.parameters["k1"].status == "OK"
     page = (tmp_path / "both.algid/report.html").read_text(encoding="utf-8")
     assert 'id="torque"' in page

@@ -10,6 +10,7 @@ import algid
 from algid.base.errors import ResultError
 from algid.identification.identify import identify
 from algid.identification.known import (
+    contradictions,
     model_of,
     prior_of,
     shift_of,
@@ -17,6 +18,7 @@ from algid.identification.known import (
 from algid.model import Model
 from algid.results import Estimate, Result, Status
 from algid.settings import Settings
+from algid.synth.cases import load_case
 from algid.synth.sensors import Sensors
 
 
@@ -47,6 +49,16 @@ def test_a_torque_acts_after_half_its_hold_and_the_delay_found_or_else_set(
     assert shift_of(result.model_copy(update={"parameters": lost})).at(0.01) == pytest.approx(
         0.004 + share * 0.01
     )
+
+
+def test_a_length_that_an_arm_contradicts_is_told_with_what_it_has(weighed: Result) -> None:
+    l1 = load_case("case1").arm.l1
+    unloaded = weighed.model_copy(update={"payload": {}})
+    stated = unloaded.model_copy(update={"settings": weighed.settings | {"l1": l1}})
+    for arm, has in ((unloaded, "identified as 0.16"), (stated, "the arm's result was made with")):
+        assert contradictions(arm, {"l1": l1}) == ()
+        (told,) = contradictions(arm, {"l1": 2 * l1})
+        assert told.text.startswith(f"l1 is given as {2 * l1:g} m, but {has}")
 
 
 def test_a_prior_that_a_result_cannot_give_is_refused_with_what_to_do(weighed: Result) -> None:

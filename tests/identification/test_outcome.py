@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from algid.estimators.combine import LogInformation
+from algid.estimators.combine import LogInformation, Prior, without
 from algid.estimators.fit import Fit
 from algid.estimators.prediction import NOTHING
 from algid.estimators.terms import Selection
@@ -27,7 +27,7 @@ from algid.identification.recordings import Recordings, open_source
 from algid.identification.validate import prediction
 from algid.log import Log, Origin
 from algid.notices import Notice, of_codes
-from algid.results import Estimate, FitSummary, Repeatability, Status
+from algid.results import Estimate, FitSummary, Repeatability, Status, TorqueHold
 from algid.settings import Settings
 from algid.table4 import LOADED_ROWS, UNLOADED_ROWS
 from tests.identification.fits import CASE, QUANTILE, K, fit_of, information, with_stds, with_values
@@ -107,6 +107,9 @@ def test_rows_of_what_the_logs_leave_open_are_unknown() -> None:
     assert rows["k6"].estimate is None
     assert rows["k4"].estimate == pytest.approx(K4)
     assert list(table_rows(fit_of(payload=False))) == [*UNLOADED_ROWS]
+    for fit in (fit_of(prior=without(None, ("k2", "k4"))), fit_of(gravity=0.0)):
+        lost = {name for name, row in table_rows(fit).items() if row.estimate is None}
+        assert lost == {"k2", "k4", "k2+z5", "k4+z4"}
 
 
 def test_a_bound_broken_by_far_spoils_every_estimate_and_one_broken_by_chance_none() -> None:
@@ -176,6 +179,14 @@ def test_a_payload_near_zero_is_at_most_the_end_of_its_interval() -> None:
     assert not found(with_stds(fit_of(lengths={"l1": ARM.l1}), m_p=np.inf), "LENGTHS_NEEDED")
 
 
+def test_torques_whose_gains_differ_are_told_by_as_much_as_without_a_prior() -> None:
+    """The prior of a shrunk gain draws it to nothing: the logs say 0.1."""
+    prior = Prior(("gain2",), np.zeros(1), np.array([[1e9]]))
+    shrunk = with_values(fit_of(terms=("gain",), prior=prior, shrinkage=prior), gain2=1e-3)
+    (one,) = found(shrunk, "TORQUE_GAIN")
+    assert one.numbers["ratio"] == pytest.approx(1.1)
+
+
 @pytest.mark.parametrize(("deviations", "named"), [(100.0, True), (2.0, False)])
 def test_a_payload_far_below_zero_means_that_the_logs_are_exchanged(
     deviations: float, named: bool
@@ -212,6 +223,7 @@ def test_repeatability_and_a_gain_of_one_are_told_in_numbers() -> None:
     summary = FitSummary(
         noise={}, covariance_names=[], covariance=[], iterations=0, converged=True,
         intervals="likelihood", repeatability=repeated, torque_gain=gain,
+        torque_hold=TorqueHold(asked="auto", used="foh", half=5e-3, faster=True),
     )  # fmt: skip
     told = {one.key: one for one in fit_notes(summary)}
     assert told["REPEATABILITY:payload"].text == (
@@ -219,6 +231,10 @@ def test_repeatability_and_a_gain_of_one_are_told_in_numbers() -> None:
         "0.0039 to 0.28)"
     )
     assert told["TORQUE_GAIN:known"].note
+    assert told["TORQUE_HOLD:fast controller"].sentence.endswith(
+        "half of the controller's period, in s: --set delay=VALUE; for a torque that is not held: "
+        "--torque-hold foh"
+    )
 
 
 def test_a_known_payload_gives_the_torques_gain_with_the_ends_of_its_interval() -> None:

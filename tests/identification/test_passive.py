@@ -93,10 +93,13 @@ def test_a_torque_that_is_zero_is_refused_until_the_joint_is_called_passive(tmp_
 
 def test_instruments_tell_what_least_squares_takes_for_nothing() -> None:
     """Cables pull as hard as the weight of the passive joint: constants near nothing solve its
-    equation all but exactly, and draw least squares.
+    equation all but exactly, and draw least squares. The other joint's sensor is 0.05 N m off.
     """
-    result = identify(log_of("case1", 1, 0), report=False)
+    log = log_of("case1", 1, 0)
+    result = identify(replace(log, tau=log.tau + [[0.0], [0.05]]), report=False)
     assert result.estimator == "instruments"
+    assert result.fit.model.terms == ["offset"]
+    assert "delay" not in result.parameters
     assert result.verdict.grade == "reservations"
     assert "INSTRUMENTS" in [notice.code for notice in result.notices]
     k = case_of("case1").arm.constants()

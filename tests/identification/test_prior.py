@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 
 import algid
 from algid.base.errors import AlgidError
+from algid.estimators.combine import without
 from algid.identification.prior import Statement, drawn_covariance, with_prior
 from algid.model import RIGID
 from algid.results import Status
@@ -47,17 +49,22 @@ def test_a_drawing_errs_as_draws_of_its_numbers_do() -> None:
     np.testing.assert_allclose(found, expected / np.outer(std, std), atol=0.07)
 
 
-def test_of_a_balanced_link_the_centre_is_not_known_exactly() -> None:
-    std = np.sqrt(np.diag(drawn_covariance(replace(ARM, lc2=0.0), 0.2)))
-    assert std[:2].min() > 0
+def test_of_a_balanced_link_the_centre_is_known_as_well_as_its_radius_of_gyration() -> None:
+    arm = replace(ARM, lc1=0.0, lc2=0.0)
+    std = np.sqrt(np.diag(drawn_covariance(arm, 0.2)))
+    centres = [math.sqrt(arm.m1 * arm.I1), math.sqrt(arm.m2 * arm.I2)]
+    assert std[1] == pytest.approx(0.2 * arm.g * centres[1])  # k2 = g m2 lc2
+    link = arm.m2 * arm.l1  # k4 = g (m1 lc1 + m2 l1), with 1 % of l1
+    assert std[3] == pytest.approx(arm.g * math.hypot(0.2 * centres[0], 0.2 * link, 0.01 * link))
 
 
 def test_both_are_weighed_by_their_information() -> None:
-    """One constant, prior as sure as the log: the mean of both, and half the variance."""
-    fit = fit_of(payload=False)
+    """One constant, prior half as sure as the log; nothing of one that the torque lacks."""
+    fit = fit_of(payload=False, prior=without(None, ("k4",)))
     fit = replace(fit, covariance=np.diag(np.full(len(fit.names), 1e-4**2)))
     std = 2e-4
-    one = Statement("arm.urdf", ("k5",), np.array([K[4] + 3e-4]), np.array([[std**2]]))
+    mean = np.array([2 * K[3], K[4] + 3e-4])
+    one = Statement("arm.urdf", ("k4", "k5"), mean, std**2 * np.eye(2))
     both, place = with_prior(fit, one), fit.names.index("k5")
     assert both.values[place] == pytest.approx(K[4] + 3e-4 / 5)
     assert both.covariance[place, place] == pytest.approx(1 / (1e8 + 1 / std**2))

@@ -102,12 +102,18 @@ def test_no_samples_count_twice_whatever_their_file() -> None:
         survey = Recordings(open_sources(logs, None))
         survey.count_once()
         return [log.rows or 0 for log in survey.logs], [
-            notice.key for log in survey.logs for notice in log.notices if notice.code == "SAME_LOG"
+            notice.text
+            for log in survey.logs
+            for notice in log.notices
+            if notice.code == "SAME_LOG"
         ]
 
     assert counted(one, other) == ([len(one), len(other)], [])
-    assert counted(part, one, other, rounded) == ([len(one), len(other)], ["SAME_LOG:twice"])
-    assert counted(first, last) == ([len(first), len(last)], ["SAME_LOG:part"])
+    twice = "text.csv and one.csv have the same samples, and count once"
+    assert counted(part, one, other, rounded) == ([len(one), len(other)], [twice])
+    half = "50 % of the samples of one.csv (2) are in one.csv too, and count twice"
+    again = "one.csv (3) has the same samples, and counts once"
+    assert counted(first, last, first) == ([len(first), len(last)], [half, again])
     assert counted(one) == ([0], [])
     assert open_sources(None, None) == []
     assert [source.name for source in open_sources(iter([one]), None)] == ["one.csv"]

@@ -128,6 +128,8 @@ def test_a_fits_series_stand_in_its_folder(
     assert min(scored["t"]) == pytest.approx(0.3, abs=0.05)  # what is dropped at the ends
     assert max(scored["t"]) == pytest.approx(3.7, abs=0.05)
     assert len(scored["t"]) < 2 * 3.4 * 70  # 50 Hz tell all that lies below 5 Hz
+    shared = [pq.read_schema(tmp_path / name) for name in names if name != "innovations.parquet"]
+    assert {str(one.field("log").type) for one in shared} == {"int32"}
     torques = pq.read_table(tmp_path / "torque.parquet")
     assert torques.num_rows == 2 * 2001
     running = pq.read_table(tmp_path / "running.parquet").to_pydict()

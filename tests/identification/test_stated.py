@@ -65,8 +65,9 @@ def test_another_effort_of_later_logs_is_predicted_without_what_it_lacks(
     constants[[1, 3]] *= MOON / 9.81
     weight = inverse_dynamics(constants, unloaded.theta, still, still)
     floating = replace(unloaded, tau=unloaded.tau - weight)
-    compensated = algid.validate(arm, floating, effort="gravity-compensated").total
-    assert max(compensated.nrmse) < 0.01
+    compensated = algid.validate(arm, floating, effort="gravity-compensated")
+    assert max(compensated.total.nrmse) < 0.01
+    assert compensated.warnings == ()
     light = algid.identify(
         floating, effort="gravity-compensated", gravity=MOON, estimator="weak", model="plain"
     )

@@ -106,6 +106,17 @@ def test_a_torque_that_acts_late_is_predicted_where_it_acts(motions: list[Simula
     assert wrong.rmse[0] > 5 * right.rmse[0]
 
 
+def test_an_arm_simulated_with_its_own_constants_follows_its_log(
+    motions: list[SimulatedMotion],
+) -> None:
+    logs = survey((logged(motions[0], 1), "unloaded"))
+    arm = Predictor(Model(), {"unloaded": K}.__getitem__)
+    found = validate(arm, logs, simulate=True).simulation
+    assert found["log1"] == found["all logs"]
+    assert [row["horizon"] for row in found["log1"]] == [0.1, 0.5, 2.0]
+    assert all(max(row["rmse"]) < 0.05 * min(row["moved"]) for row in found["log1"])
+
+
 def test_cross_validation_is_the_prediction_of_each_log_by_a_fit_of_the_others(
     motions: list[SimulatedMotion],
 ) -> None:
