@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from itertools import product
 from math import copysign, pi, remainder
 from operator import itemgetter
@@ -263,9 +263,7 @@ def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgeme
         judged = _judged(candidates, trials)
     best = judged.best
     if judged.alone and (best.family != AS_READ or max(map(abs, best.zero)) > LARGEST_PHASE):
-        bent = trials.bent()
-        if bent is not None and bent <= best.score + trials.apart:
-            return replace(judged, alone=False)
+        return replace(judged, alone=trials.bent() > best.score + trials.apart)
     return judged
 
 
@@ -316,16 +314,16 @@ class Trials:
     def __init__(self, logs: Sequence[Recorded], gravity: bool) -> None:
         self._logs = logs
         self._fine, self._coarse = (
-            [
+            tuple(
                 thinned(log.theta, log.tau, log.dt, rate, seconds_of_each(len(logs), longest))
                 for log in logs
-            ]
+            )
             for rate, longest in (_FINE, _COARSE)
         )
         self._model = MODEL if gravity else replace(MODEL, gravity=0.0)
         self._names = outside(self._model.names, SINES)
         self._turns = _TURNS if gravity else _TURNS[:2]
-        self._passes: dict[tuple[Convention, bool], ConventionSums] = {}
+        self._summed = cache(partial(summed, model=self._model))
         self.seconds = self._sums(AS_READ).seconds
         """How long the logs move, in s."""
         self.apart = max(APART, 2 * EVIDENCE * WINDOW / max(self.seconds, _SHORTEST))
@@ -431,13 +429,10 @@ class Trials:
         k = named_values(self._model.names, c)
         return np.angle([phasor_of(k, moment) for moment in MOMENTS])
 
-    def bent(self) -> float | None:
-        """What is left as the log was read with a phase for each moment.
-
-        None where one is no phase.
-        """
+    def bent(self) -> float:
+        """The score as the log was read with a phase for each moment; infinite if one is none."""
         (c,), left = self._with_phases([AS_READ])
-        return None if np.abs(self._phases(c)).max() > LARGEST_PHASE else float(_score(left)[0])
+        return np.inf if np.abs(self._phases(c)).max() > LARGEST_PHASE else float(_score(left)[0])
 
     def _places(self, zeros: FloatArray) -> FloatArray:
         """T (Z, q, p) of Z zeros δ1 and δ2 (Z, 2)."""
@@ -454,10 +449,7 @@ class Trials:
     def _sums(self, family: Convention, *, coarse: bool = False) -> ConventionSums:
         """Sums for a family's angles, one pass for all that share them."""
         angles = replace(family, torques_swapped=False, torque_signs=(1, 1), base=0)
-        if (angles, coarse) not in self._passes:
-            logs = self._coarse if coarse else self._fine
-            self._passes[angles, coarse] = summed(angles, logs, self._model)
-        return self._passes[angles, coarse]
+        return self._summed(angles, self._coarse if coarse else self._fine)
 
 
 def _families(read: Recorded) -> Iterator[list[Convention]]:

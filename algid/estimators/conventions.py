@@ -163,21 +163,21 @@ def summed(angles: Convention, logs: Sequence[Segment], model: Model) -> Convent
 def solved(
     sums: ConventionSums, families: Sequence[Convention], T: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Weighted least squares for each of F families with each T of (Z, q, p), F Z fits.
+    """Weighted least squares of n fits: for families with one T (1, q, p), or for one with n.
 
-    Gives c (F Z, p), shares left (F Z, 2) and covariances (F Z, p, p). Where a joint has no torque
+    Gives c (n, p), shares left (n, 2) and covariances (n, p, p). Where a joint has no torque
     what is left is a share of what acts on it, summed over the columns, as constants near nothing
     leave nothing of it.
     """
     q, p = T.shape[1:]
     drives = np.stack([family.drive for family in families])
-    M = np.zeros((len(drives), len(T), 2, q + 2, p + 1))
+    M = np.zeros((max(len(drives), len(T)), 2, q + 2, p + 1))
     M[..., :q, :p] = T[:, None]
-    M[..., q:, p] = drives[:, None]
-    gram = (M.swapaxes(-1, -2) @ sums.gram @ M).reshape(-1, 2, p + 1, p + 1)
+    M[..., q:, p] = drives
+    gram = M.swapaxes(-1, -2) @ sums.gram @ M
     own = np.stack([replace(family, base=0).drive for family in families])
     power = np.einsum("faj,ajj->fa", own**2, sums.gram[:, q:, q:])
-    power = np.maximum(np.repeat(power, len(T), axis=0), _LEAST_POWER)
+    power = np.broadcast_to(np.maximum(power, _LEAST_POWER), (len(M), 2))
     motorless = power == _LEAST_POWER
     ridge = 1e-12 * np.eye(p)
 

@@ -37,7 +37,6 @@ from algid.estimators.combine import (
     likelihood,
     of_kind,
     scaled_pinv,
-    scores_of,
 )
 from algid.estimators.fit import Fit, alone
 from algid.estimators.identifiability import sizes
@@ -278,15 +277,15 @@ def ratio_of_joints(normals: Sequence[Normal], model: Model, unlike: float) -> f
         return None  # without a motor a joint's equation is solved by nothing
     both = np.flatnonzero(np.isin(model.names, (K1, K2, K3)))
 
-    def of_joint(joint: int) -> tuple[FloatArray, FloatArray]:
+    # as one log: how runs differ does not tell what is alike in all of them
+    grams, nothing = np.concatenate([one.gram for one in normals]), np.zeros(len(model.names))
+
+    def of_joint(gram: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What one joint's equation gives for the constants of both, and their covariance."""
-        nothing = np.zeros(len(model.names))
-        # as one log: how runs differ does not tell what is alike in all of them
-        gram = np.concatenate([normal.gram[:, joint] for normal in normals])
         own = alone(shared, [LogInformation(False, nothing, gram[:, :-1, :-1], gram[:, :-1, -1])])
         return own.values[both], own.covariance[np.ix_(both, both)]
 
-    (f, F), (s, S) = of_joint(0), of_joint(1)
+    (f, F), (s, S) = map(of_joint, grams.swapaxes(0, 1))
     ratios = np.concatenate([[1.0], _RATIOS, -_RATIOS])
     size = np.sqrt(np.maximum(np.diag(S) + np.diag(F), 1e-300))
     apart = (s - ratios[:, None] * f) / size
@@ -321,13 +320,13 @@ _LEAST_TAIL = float(np.finfo(float).tiny)
 """Probability: smaller ones are zero, and infinitely far."""
 
 
-def payload_distance(fit: Fit) -> float | None:
+def payload_distance(fit: Fit) -> float:
     """How far the loaded logs are from the unloaded arm with any payload.
 
     Returns
     -------
-    float or None
-        In standard deviations of a normal variable as unlikely; None where the logs of either kind
+    float
+        In standard deviations of a normal variable as unlikely; 0 where the logs of either kind
         do not determine their own constants, or have fewer stretches than constants: directions
         without a variance are rounding's.
 
@@ -339,12 +338,12 @@ def payload_distance(fit: Fit) -> float | None:
     """
     kinds = [of_kind(fit.logs, loaded) for loaded in (False, True)]
     if not (fit.shared.payload and all(kinds)):
-        return None
+        return 0.0
     bare, burdened = (alone(fit.shared, own) for own in kinds)
     constants = len(fit.shared.log_names)
     fewest = min(sum(len(log.S) for log in own) for own in kinds)
     if bare.unidentifiable or burdened.unidentifiable or fewest <= constants:
-        return None
+        return 0.0
     freedom = 2 * constants - len(fit.shared.names)
     arm = Prior.of(bare.names, bare.values, bare.covariance)
     S = scaled_pinv(burdened.covariance)
@@ -371,12 +370,10 @@ def repeatability(fit: Fit) -> tuple[FloatArray, float, tuple[float, float]] | N
     place = fit.names.index("m_p")
     masses = []
     for log in loaded:
-        T, scores = scores_of(fit.shared, log, fit.values)
-        slope = T[:, place]
-        information = slope @ log.total[0] @ slope
-        if information <= 0:
+        _, score, S = likelihood(fit.shared, [log], fit.values, None)
+        if S[place, place] <= 0:
             return None
-        masses.append(fit.values[place] + np.sum(scores @ slope) / information)
+        masses.append(fit.values[place] + score[place] / S[place, place])
     freedom = len(masses) - 1
     std = float(np.std(masses, ddof=1))
     low, high = (

@@ -33,7 +33,7 @@ from algid.estimators.identifiability import (
     examine,
     open_directions,
 )
-from algid.estimators.innovations import ResidualSums, Whiteness
+from algid.estimators.innovations import ResidualSums
 from algid.estimators.parametrisation import Shared
 from algid.estimators.repeats import Groups, merged
 from algid.estimators.whitening import NoiseLevels
@@ -68,7 +68,6 @@ class Fit:
     unidentifiable : what the logs leave open
     logs : each log's quadratic likelihood, unloaded ones first
     noise : each log's noise levels; None for the weak estimator
-    whiteness : outcome of the test on the innovations; None for the weak estimator
     residual : sums over the innovations, log by log; empty where they were not gathered
     freedom : independent stretches of log behind a sandwich, else samples of torque
     iterations, converged : of the refined estimator
@@ -90,7 +89,6 @@ class Fit:
     unidentifiable: tuple[Notice, ...]
     logs: tuple[LogInformation, ...]
     noise: tuple[NoiseLevels, ...] | None = None
-    whiteness: Whiteness | None = None
     residual: tuple[ResidualSums, ...] = ()
     freedom: int = 1
     iterations: int = 0
@@ -344,7 +342,6 @@ def solved_anew(fit: Fit, shared: Shared, prior: Prior | None, shrinkage: Prior 
         anew,
         status=(*status, *anew.status[arm:]),
         noise=fit.noise,
-        whiteness=fit.whiteness,
         residual=fit.residual,
         iterations=fit.iterations,
         endogeneity=fit.endogeneity,

@@ -115,7 +115,7 @@ def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
 
     def largest(scale: Scale, among: Iterable[str]) -> float:
         return max(
-            (value_of[name] for name in among if PARAMETERS[name].scale == scale), default=0.0
+            (value_of[name] for name in among if PARAMETERS[name].scale is scale), default=0.0
         )
 
     arm = within(RIGID, names)

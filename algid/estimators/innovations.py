@@ -25,6 +25,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import reduce
+from operator import add
 from typing import NamedTuple
 
 import numpy as np
@@ -93,9 +95,7 @@ def residual_sums(w: FloatArray, dt: float, stride: int = 1, lags: int = LAGS) -
     place = np.clip(np.searchsorted(_EDGES, frequency, side="right") - 1, 0, _BINS - 1)
     lines = np.bincount(place, minlength=_BINS).astype(np.float64)
     power = np.stack([np.bincount(place, row, minlength=_BINS) for row in periodogram])
-    near = _NEIGHBOURS[0] * np.maximum(lines - 1, 0.0)
-    far = _NEIGHBOURS[1] * np.maximum(lines - 2, 0.0)
-    scatter = lines + 2 * (near + far)
+    scatter = lines + 2 * np.dot(_NEIGHBOURS, np.maximum(lines - [[1], [2]], 0.0))
     pairs = np.maximum(n - np.arange(lags + 1, dtype=np.float64), 0.0)
     counts, products = n // np.array(SCALES), []
     for scale, whole in zip(SCALES, counts.tolist(), strict=True):
@@ -134,26 +134,25 @@ def spectra(sums: ResidualSums) -> Curves:
 
     Bins are merged until each has `_FREEDOM` degrees of freedom.
     """
-    starts, count, spread = [], 0.0, 0.0
-    begin = last = 0
-    for place in range(_BINS):
-        if not count and not sums.lines[place]:
-            begin = place
+    filled, ends = np.flatnonzero(sums.lines), list[int]()
+    count = spread = 0.0
+    for place in filled.tolist():
         count, spread = count + sums.lines[place], spread + sums.scatter[place]
-        if count and 2 * count**2 / spread >= _FREEDOM:
-            starts.append(begin)
-            begin = last = place + 1
-            count, spread = 0.0, 0.0
-    if not starts:
-        return Curves(np.empty(0), np.empty((sums.power.shape[0], 0)), np.empty(0), np.empty(0))
-    ends = np.array(starts[1:] + [last]) - 1
+        if 2 * count**2 / spread >= _FREEDOM:
+            ends.append(place + 1)
+            count = spread = 0.0
+    before = np.array([0, *ends[:-1]])[: len(ends)]
+    starts, last = (
+        np.maximum(filled[np.searchsorted(filled, before)] - 1, before),
+        max(ends, default=0),
+    )
     lines = np.add.reduceat(sums.lines[:last], starts)
     scatter = np.add.reduceat(sums.scatter[:last], starts)
     density = np.add.reduceat(sums.power[:, :last], starts, axis=1) / lines
     freedom = 2 * lines**2 / scatter
     low = chi2_exceeded(freedom, 0.975) / freedom
     high = chi2_exceeded(freedom, 0.025) / freedom
-    middle = np.sqrt(_EDGES[starts] * _EDGES[ends + 1])
+    middle = np.sqrt(_EDGES[starts] * _EDGES[ends])
     return Curves(middle / sums.dt, 2 * sums.dt * density, low, high)
 
 
@@ -187,18 +186,13 @@ class Whiteness(NamedTuple):
     lag1: FloatArray
     joint_white: tuple[bool, ...]
 
-    @property
-    def white(self) -> bool:
-        """Whether both joints' innovations pass."""
-        return all(self.joint_white)
 
-
-def judge(sums: ResidualSums) -> Whiteness:
+def judge(residual: Sequence[ResidualSums]) -> Whiteness:
     """Test innovations for whiteness.
 
     Parameters
     ----------
-    sums : ResidualSums
+    residual : ResidualSums of each log
 
     Returns
     -------
@@ -210,6 +204,7 @@ def judge(sums: ResidualSums) -> Whiteness:
     Ljung & Box 1978: n (n + 2) Σ ρ_l² / (n − l) over the lags l is χ² with as many degrees of
     freedom.
     """
+    sums = reduce(add, residual)
     power = np.maximum(sums.products[:, :, :1], 1e-300)
     rho = sums.products[:, :, 1 : 1 + _LAGS] / power
     n = sums.counts[:, None, None]

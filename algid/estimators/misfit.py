@@ -121,13 +121,11 @@ class Products:
         self.determinant = 0.0
         self.each: list[tuple[bool, FloatArray]] = []
         grams, q = [], len(self.shared.log_names)
-        driven = [
-            any(np.any(piece.tau[joint]) for log in logs for piece in log.kept) for joint in (0, 1)
-        ]
+        driven = np.any([piece.tau.any(axis=1) for log in logs for piece in log.kept], axis=0)
         for log in logs:
             c = vector(self.names, {DELAYS[0]: base, **at[log.loaded]}, otherwise=0.0)
             gram, determinant = log.products(self.shared, c[:q], beside)
-            if not all(driven):
+            if not driven.all():
                 # where a joint has no motor, its gain is nothing and makes its equation vanish
                 for place, _ in acting(self.shared.model, "gains"):
                     gram[:, place] = gram[:, :, place] = 0

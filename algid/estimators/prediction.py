@@ -53,7 +53,7 @@ FILTER = (
 )
 
 
-NOTHING = np.zeros((9, 2))
+NOTHING: FloatArray = np.zeros((9, 2))
 """What `score` gives of a log that is too short."""
 
 
@@ -81,14 +81,13 @@ def sums_of(model: Model, c: FloatArray, X: FloatArray, omega: FloatArray) -> Fl
     r = tau - parts.sum(axis=1)
     still = np.abs(omega) < model.coulomb_speed
     held = np.abs(r)
-    for joint, name in enumerate((F1, F2)):
-        place = model.compiled.place.get(name)
-        if place is not None:
-            f = max(float(c[place]), 0.0)
-            held[joint] = np.maximum(np.abs(r[joint] + f * X[joint, place]) - f, 0.0)
+    if F1 in model.names:
+        places = list(map(model.names.index, (F1, F2)))
+        f = np.maximum(c[places], 0.0)[:, None]
+        held = np.maximum(np.abs(r + f * X[[0, 1], places]) - f, 0.0)
     rows = [tau, tau**2, np.sum(parts**2, axis=1), r**2]
     rows += [~still, ~still * r**2, still, still * r**2, still * held**2]
-    return np.array([row.sum(axis=1) for row in rows])
+    return np.sum(rows, axis=2)
 
 
 def _decimated(piece: Segment) -> Segment:
@@ -156,10 +155,8 @@ def score(
     return sum((sums_of(model, c, X, omega) for _, omega, X in every), NOTHING)
 
 
-def cross_validate(
-    fit: Fit, sources: Sequence[Source], shift: TorqueShift = AT_ONCE
-) -> FloatArray | None:
-    """Score of each log predicted from all the others; None where a kind of log has only one.
+def cross_validate(fit: Fit, sources: Sequence[Source], shift: TorqueShift = AT_ONCE) -> FloatArray:
+    """Score of each log predicted from all the others; nothing where a kind of log has only one.
 
     The other logs' parameters follow from their quadratic likelihoods, without a further pass;
     only the prediction reads the logs again. `shift` is what is known of the time after which a
@@ -167,7 +164,7 @@ def cross_validate(
     """
     kinds = [log.loaded for log in fit.logs]
     if len(sources) != len(kinds) or 1 in map(kinds.count, kinds):
-        return None
+        return NOTHING
     total, columns = NOTHING, len(fit.shared.model.names)
     without = left_out(fit.shared, fit.logs, fit.values, fit.prior)
     for source, log, beta in zip(sources, fit.logs, without, strict=True):

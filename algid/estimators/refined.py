@@ -20,9 +20,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, reduce
+from functools import cache
 from itertools import combinations
-from operator import add
 from typing import Any, Literal
 
 import numpy as np
@@ -112,7 +111,6 @@ def fit(problem: Problem) -> Fit:
         if not all(log.whole for log in logs):
             trained = _finish(trained, logs, anchored)
         residual = tuple(outcome.residual for outcome in trained.outcomes)
-        whiteness = judge(reduce(add, residual))
         repeats: Groups = ()
         if len(logs) <= _MOST_COMPARED:
             kinds = ([log.training for log in logs if log.loaded is kind] for kind in (False, True))
@@ -124,7 +122,7 @@ def fit(problem: Problem) -> Fit:
             trained.beta,
             start.moved,
             prior,
-            coloured=not whiteness.white,
+            coloured=not all(judge(residual).joint_white),
             samples=int(_count(trained.outcomes)),
             repeats=repeats,
         )
@@ -152,7 +150,6 @@ def fit(problem: Problem) -> Fit:
             status=tuple(status),
             unidentifiable=tuple(dict.fromkeys(fitted.unidentifiable + start.unidentifiable)),
             noise=tuple(log.noise for log in logs),
-            whiteness=whiteness,
             residual=residual,
             iterations=iterations,
             products=products,
@@ -215,7 +212,7 @@ def _train(
     total = sum(log.trained for log in logs)
     many = len(logs) > _MOST_SCORED
     before = np.zeros_like(beta)
-    end: End | None = None
+    end: End = "unsettled"
     for steps in range(1, _STEPS + 1):
         outcomes: list[Outcome] = []
         done = 0
@@ -245,16 +242,18 @@ def _train(
         # on the way to its level noise may be larger
         if misfit(logs, [log.noise.tau for log in logs]) < level("REFUTED"):
             end = "refuted"
+            break
         # Steps that shrink do so in the same ratio: what is left of the geometric series.
-        elif steps > 1 and (
+        if steps > 1 and (
             moved < SETTLED or (moved < earlier and moved**2 / (earlier - moved) < _REST)
         ):
             end = "settled"
-        if end:
-            return _Trained(shared, beta, outcomes, steps, end)
+            break
     # steps within what a torque's error that matters would leave, where there is next to none
-    close = moved * min(1.0, max(log.relative_error for log in logs)) < _CLOSE
-    return _Trained(shared, beta, outcomes, steps, "settled" if close else "unsettled")
+    error = max(log.relative_error for log in logs)
+    if end == "unsettled" and moved * min(1.0, error) < _CLOSE:
+        end = "settled"
+    return _Trained(shared, beta, outcomes, steps, end)
 
 
 def _settled_widths(

@@ -259,7 +259,7 @@ def _of_arms(found: Fitted) -> Iterator[Notice]:
     if far:
         yield Notice("LOGS_APART", numbers={"case": "exchanged", "p_value": chance(far)})
     apart = payload_distance(found.fit.with_free_lengths)
-    if apart is not None and apart > FAR:
+    if apart > FAR:
         numbers = {"distance": apart, "p_value": chance(apart)}
         yield Notice("LOGS_APART", numbers={"case": "apart"} | numbers)
 

@@ -16,8 +16,9 @@ from algid.base.names import named_values, outside, places_outside, within
 from algid.base.significance import chance, level
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, repeatability, term_worths
 from algid.estimators.fit import Fit
+from algid.estimators.innovations import judge
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
-from algid.estimators.prediction import cross_validate
+from algid.estimators.prediction import NOTHING, cross_validate
 from algid.estimators.terms import Selection
 from algid.identification.by_likelihood import Fitted
 from algid.identification.checks import fit_notes, remarks
@@ -184,7 +185,7 @@ def table_rows(fit: Fit) -> dict[str, Estimate]:
 def fit_summary(found: Fitted) -> results.FitSummary:
     """The statistical part of a result."""
     fit, survey, settings, chosen = found.fit, found.survey, found.settings, found.chosen
-    crossed = None  # each log predicted from the others, where asked and possible
+    crossed = NOTHING  # each log predicted from the others, where asked and possible
     if settings.cross_validate:
         logs = [partial(survey.segments, log) for log in survey.logs]
         crossed = cross_validate(fit, logs, settings.torque_shift())
@@ -206,7 +207,8 @@ def fit_summary(found: Fitted) -> results.FitSummary:
         # all that has N m in its unit, m_p too, grows with a common gain of both torques
         gain = _inverse(fit, "m_p", known, "1")
     whiteness = {}  # empty where no test was made
-    if (tests := fit.whiteness) is not None:
+    if fit.residual:
+        tests = judge(fit.residual)
         for joint, name in enumerate(("tau1", "tau2")):
             whiteness[name] = results.WhitenessTest(
                 white=tests.joint_white[joint],
@@ -258,7 +260,7 @@ def fit_summary(found: Fitted) -> results.FitSummary:
         endogeneity=endogeneity,
         by_log=by_log,
         residual=predicted_by(predictor_of_fit(found), survey),
-        cross_validation=None if crossed is None else prediction(crossed),
+        cross_validation=prediction(crossed),
         repeatability=repeated,
         torque_gain=gain,
         stiffness={

@@ -10,8 +10,8 @@ from algid.arm import FloatArray
 from algid.estimators.innovations import ResidualSums, judge, residual_sums
 
 
-def summed(w: FloatArray) -> ResidualSums:
-    return residual_sums(w, 1.0)
+def summed(w: FloatArray) -> list[ResidualSums]:
+    return [residual_sums(w, 1.0)]
 
 
 def _ljung_box(x: np.ndarray, lags: int = 10) -> float:
@@ -50,7 +50,7 @@ def test_the_p_value_is_that_of_the_least_likely_scale_three_times_over() -> Non
 def test_white_innovations_pass_as_often_as_said_and_coloured_ones_do_not() -> None:
     rng = np.random.default_rng(5)
     found = [judge(summed(rng.standard_normal((2, 4000)))) for _ in range(400)]
-    assert sum(one.white for one in found) >= 398
+    assert sum(all(one.joint_white) for one in found) >= 398
     fast, slow = rng.standard_normal((2, 4001)), rng.standard_normal((2, 4000))
     fast[0, 1:] += 0.15 * fast[0, :-1]
     slow[1] += 0.15 * np.sin(np.arange(4000) / 60)
@@ -64,4 +64,4 @@ def test_colour_that_is_too_faint_to_matter_is_none() -> None:
         [np.convolve(row, [1.0, 0.03], "valid") for row in rng.standard_normal((2, 60_001))]
     )
     assert float(chi2.sf(60_000 * 0.03**2, 10)) < 1e-6  # Ljung and Box alone would call it coloured
-    assert judge(summed(faint)).white
+    assert all(judge(summed(faint)).joint_white)
