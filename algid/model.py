@@ -353,7 +353,7 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
         Y[:, share] = c[whole] * (Y[:, share] - Y[:, whole])
     for place, joint in acting(model, "by_load"):
         loads = list(compiled.loads)
-        load = _torques(Y[joint, loads], apart(model, c)[loads])
+        load = torques_of(Y[joint, loads], apart(model, c)[loads])
         Y[joint, place] = np.abs(load) * smooth_sign(model, motion.omega[joint])
     if acting(model, "gains"):
         Y *= gains(model, c).reshape(2, 1, -1)
@@ -444,14 +444,14 @@ def gains(model: Model, c: FloatArray) -> FloatArray:
     return factor
 
 
-def _torques(rows: FloatArray, c: FloatArray) -> FloatArray:
+def torques_of(rows: FloatArray, c: FloatArray) -> FloatArray:
     """Torques (..., N) of a regressor's rows (..., q, N) at coefficients (q,) or (q, N)."""
     return np.einsum("...qn,qn->...n", rows, c.reshape(c.shape[0], -1))
 
 
 def torque(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     """Torque τ (2, N) in N m; without a low-pass, which needs the torque at other instants too."""
-    return _torques(regressor(model, motion, c), c)
+    return torques_of(regressor(model, motion, c), c)
 
 
 def load(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
@@ -492,18 +492,26 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     if model.linear:
         return J
     loads = list(model.compiled.loads)
-    for share, whole in acting(model, "of_motor"):
-        if c[whole]:  # of nothing no motor has a share
-            J[:, whole] += c[share] / c[whole] * J[:, share]
-    factor = gains(model, c)
-    for place, joint in acting(model, "gains"):
-        J[joint, place] = _torques(J[joint], c) / factor[joint]
+    differentiate(model, J, c)
     for place, joint in acting(model, "by_load"):
         # a gain scales the load, which leaves its sign
-        load = _torques(J[joint, loads], apart(model, c)[loads])
+        load = torques_of(J[joint, loads], apart(model, c)[loads])
         sign = smooth_sign(model, motion.omega[joint])
         J[joint, loads] *= 1 + c[place] * sign * np.sign(load)
     return J
+
+
+def differentiate(model: Model, Y: FloatArray, c: FloatArray) -> None:
+    """Make of a regressor Y (2, q, N) at `c`, in place, derivatives by gains and motors' shares.
+
+    It may be of samples or of windows.
+    """
+    tau = torques_of(Y, c)
+    for share, whole in acting(model, "of_motor"):
+        if c[whole]:  # of nothing no motor has a share
+            Y[:, whole] += c[share] / c[whole] * Y[:, share]
+    for place, joint in acting(model, "gains"):
+        Y[joint, place] = tau[joint] / gains(model, c)[joint]
 
 
 def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:

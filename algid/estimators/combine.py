@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 from operator import add
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -173,7 +174,19 @@ def combine(
     return beta, S, value
 
 
-def of_kind(logs: Iterable[LogInformation], loaded: bool) -> list[LogInformation]:
+class OfLog(Protocol):
+    """What belongs to a log."""
+
+    @property
+    def loaded(self) -> bool:
+        """Whether that is a loaded one."""
+        ...
+
+
+OneOfLog = TypeVar("OneOfLog", bound=OfLog)
+
+
+def of_kind(logs: Iterable[OneOfLog], loaded: bool) -> list[OneOfLog]:
     """Those of the logs that are loaded, or those that are not."""
     return [log for log in logs if log.loaded is loaded]
 

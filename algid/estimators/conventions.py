@@ -48,7 +48,7 @@ from algid.arm import FloatArray
 from algid.base.criteria import AT_REST
 from algid.estimators import weak
 from algid.estimators.modulating_functions import OVERLAP, Windows
-from algid.estimators.problem import OF_A_WINDOW, Source, TooShortError, WeakSettings
+from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
 from algid.model import Model
 from algid.physics.terms.coulomb import COULOMB
 from algid.physics.terms.offset import OFFSET
@@ -151,10 +151,11 @@ def summed(angles: Convention, logs: Sequence[Segment], model: Model) -> Convent
     settings = WeakSettings(model, WINDOW)
     speed = weak.speeds(sources, settings)
     rest = (AT_REST * speed[0], AT_REST * speed[1])
-    normals = weak.normals_of(sources, replace(settings, rest=rest), beside=torques)
+    problem = Problem(sources, settings=replace(settings, rest=rest))
+    normals = weak.normals_of(problem, beside=torques)
     if not normals:
         raise TooShortError(f"no {OF_A_WINDOW}")
-    gram = np.sum([normal.gram.sum(axis=0) for normal in normals], axis=0)
+    gram = np.sum([normal.total for normal in normals], axis=0)
     rows = np.stack([normal.rows for normal in normals])
     seconds = WINDOW / OVERLAP * np.sum(rows.max(axis=1) + OVERLAP)
     return ConventionSums(gram[:, :-1, :-1], rows.sum(axis=0) / OVERLAP, speed, seconds)

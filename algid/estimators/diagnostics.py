@@ -42,7 +42,7 @@ from algid.estimators.fit import Fit, alone
 from algid.estimators.identifiability import sizes
 from algid.estimators.modulating_functions import MOTORLESS
 from algid.estimators.parametrisation import Shared
-from algid.estimators.problem import Problem, Source
+from algid.estimators.problem import Problem
 from algid.estimators.weak import Normal
 from algid.model import (
     K1,
@@ -398,8 +398,7 @@ def undriven(fit: Fit, problem: Problem) -> Notice | None:
     torque: constants near nothing solve that equation too, and least squares ends there where
     friction and cables pull as hard as the arm's own load.
     """
-    for kind, sources in problem.kinds():
-        c, gram = _at_fit(fit, problem, kind, sources)
+    for c, gram in _at_fit(fit, problem).values():
         power = gram[:, -1, -1]
         for joint in range(2):
             acting = np.diag(gram[joint])[:-1] @ c**2
@@ -408,15 +407,16 @@ def undriven(fit: Fit, problem: Problem) -> Notice | None:
     return None
 
 
-def _at_fit(
-    fit: Fit, problem: Problem, kind: bool, sources: Sequence[Source]
-) -> tuple[FloatArray, FloatArray]:
-    """Coefficients (q,) of logs of one kind, and sums (2, q + 1, q + 1) of their windows there."""
-    settings = problem.at(fit.shared.model, fit.delay).settings
-    c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
-    normals = weak.normals_of(sources, settings, c)
-    nothing = np.zeros((2, c.size + 1, c.size + 1))
-    return c, sum((normal.gram.sum(axis=0) for normal in normals), nothing)
+def _at_fit(fit: Fit, problem: Problem) -> dict[bool, tuple[FloatArray, FloatArray]]:
+    """Coefficients (q,) of each kind of logs, and sums (2, q + 1, q + 1) of their windows there."""
+    shared, columns = fit.shared, len(fit.shared.model.names)
+    at = {kind: shared.coefficients(fit.values, kind)[:columns] for kind, _ in problem.kinds()}
+    normals = weak.normals_of(problem.at(shared.model, fit.delay), at)
+    nothing = np.zeros((2, columns + 1, columns + 1))
+    return {
+        kind: (c, sum((normal.total for normal in of_kind(normals, kind)), nothing))
+        for kind, c in at.items()
+    }
 
 
 def contradicted(fit: Fit, problem: Problem) -> Notice | None:
@@ -434,12 +434,13 @@ def contradicted(fit: Fit, problem: Problem) -> Notice | None:
     still = [f"joint {joint + 1}" for joint in range(2) if fit.moved[joint] < STILL]
     if few and still:
         return Notice("HARDLY_DRIVEN", numbers={"case": "still", "joints": still})
-    settings = problem.at(problem.settings.model, fit.delay).settings
-    for kind, sources in problem.kinds():
-        normals = weak.normals_of(sources, settings)
+    model = problem.settings.model
+    every = weak.normals_of(problem.at(model, fit.delay))
+    for kind in (False, True):
+        normals = of_kind(every, kind)
         if not normals:
             continue
-        ratio = ratio_of_joints(normals, settings.model, UNLIKE if few else UNLIKE_IN_MANY)
+        ratio = ratio_of_joints(normals, model, UNLIKE if few else UNLIKE_IN_MANY)
         if ratio is not None:
             return Notice("JOINTS_CONTRADICT", numbers={"ratio": ratio})
         torques = np.max([normal.power / normal.rows for normal in normals], axis=0)
@@ -448,7 +449,7 @@ def contradicted(fit: Fit, problem: Problem) -> Notice | None:
         if not few or not hardly.any():
             continue
         joint = int(np.argmax(hardly)) + 1
-        c, gram = _at_fit(fit, problem, kind, sources)
+        c, gram = _at_fit(fit, problem)[kind]
         if not _confirmed(fit.shared.model.names, joint, c, gram):
             return Notice(
                 "HARDLY_DRIVEN",

@@ -63,7 +63,7 @@ from algid.estimators.fit import Fit, finish
 from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem, Source, WeakSettings
-from algid.model import DELAYS, Model, advanced, inertia
+from algid.model import Model, advanced, inertia
 from algid.signals.segments import Segment
 
 _ROUNDS = 4
@@ -131,9 +131,7 @@ def evidence(
     model, delay = settings.model, settings.estimate_delay
     for kind, sources in problem.kinds():
         c0 = shared.coefficients(beta, kind)
-        # the windows are shifted by the delay: the column is a change's
-        c = c0 - settings.shift.delay * np.isin(shared.log_names, DELAYS)
-        linear = c[: len(model.names)]
+        linear = c0[: len(model.names)]
         grams = [BlockSums() for _ in sources]
         rows, lost = np.zeros((2, len(grams)), dtype=np.int64)
         for batch in _batches(sources, settings):
@@ -141,7 +139,8 @@ def evidence(
             for (number, piece, windows), (own, motion, step, good) in zip(
                 batch, motions, strict=True
             ):
-                X = windows.equations(model, piece, delay, linear)[:, :, ::_STRIDE]
+                X = windows.equations(model, piece, delay, linear)
+                X = weak.of_whole_delay(X, settings)[:, :, ::_STRIDE]
                 Z = own.equations(model, motion, delay, linear)[:, :-1, ::step]
                 used = good & windows.moving(piece, settings.rest)[:, ::_STRIDE]
                 both = np.where(used[:, None], np.concatenate([Z, X], axis=1), 0.0)
@@ -152,8 +151,7 @@ def evidence(
             return []
         for sums, count in zip(grams, (rows - lost).tolist(), strict=True):
             if count:
-                log = weak.evidence(sums.values(), count, c, kind, every=_STRIDE)
-                logs.append(replace(log, c0=c0))
+                logs.append(weak.evidence(sums.values(), count, c0, kind, every=_STRIDE))
     return logs
 
 

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property, lru_cache, partial
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -37,12 +37,14 @@ from algid.model import (
     Motion,
     acting,
     apart,
+    differentiate,
     gains,
     inertial,
     link_motion,
     load,
     sensitivity,
     smooth_sign,
+    torques_of,
 )
 from algid.physics.signals import WIDTHS, Expression, Product, Values
 from algid.signals.filters import correlate, differentiator, half_length, smoother
@@ -126,7 +128,7 @@ class Windows:
         self,
         model: Model,
         piece: Segment,
-        delay: bool,
+        delay: bool = False,
         at: FloatArray | None = None,
         known: Known | None = None,
     ) -> FloatArray:
@@ -160,43 +162,44 @@ class Windows:
         derivative): least squares settles in a few rounds.
         """
         q, count = len(model.names), self.count(piece)
-        X = np.zeros((2, q + delay + 1, count))
         if not count:
-            return X
+            return np.zeros((2, q + delay + 1, 0))
         here = np.zeros(q) if at is None else at
         known = {} if known is None else known
         theta = piece.theta[:, self.margin : len(piece) - self.margin]
-        speed = (self._own, "velocity")  # a change of friction's width asks for it again
 
         def motion() -> Motion:
-            omega = known[speed] = known[speed] if speed in known else self.velocities(piece)
+            # a change of friction's width asks for it again
+            omega = self._once(known, "velocity", partial(self.velocities, piece))
             return Motion(theta, omega, omega)
 
-        X[:, :q] = self.columns(model, theta.shape[1], motion, known)
-        # with the derivative J at c0 of Y c0, τ = Y c0 + J (c - c0) is J c = τ + (J - Y) c0
-        more: FloatArray = np.zeros((2, q, count))  # J - Y
+        def acted(order: int) -> FloatArray:
+            moments = partial(self.torque_moments, piece.tau, order)
+            return self._once(known, (self.shift, order), moments)
+
+        X = self.columns(model, theta.shape[1], motion, known)
+        bends: FloatArray | float = 0.0
         if at is not None and acting(model, "elastic"):
-            more = self._bend(X, model, at, motion(), self._acting(piece.tau))
+            bends = self._bend(X, model, at, motion(), self._acting(piece.tau))
         for share, whole in acting(model, "of_motor"):
             X[:, share] = here[whole] * (X[:, share] - X[:, whole])
-            more[:, whole] += here[share] / (here[whole] or 1.0) * X[:, share]
         if at is not None and acting(model, "by_load"):
             accelerated = self._accelerated(motion())
             L = load(model, at, accelerated)
             moments = self.moments(np.abs(L) * smooth_sign(model, accelerated.omega))
             for place, joint in acting(model, "by_load"):
                 X[joint, place] = moments[joint]
-        X *= gains(model, here)[:, None, None]
-        more *= gains(model, here)[:, None, None]
-        for place, joint in acting(model, "gains"):
-            more[joint, place] += X[joint, :q].T @ here / gains(model, here)[joint]
-        X[:, :q] += more
-        X[:, -1] = self._of_torque(piece, 0, known) + np.einsum("j,ajr->ar", here, more)
+        factor = gains(model, here)[:, None, None]
+        X *= factor
+        # with the derivative J at c0 of Y c0, τ = Y c0 + J (c - c0) is J c = τ + (J - Y) c0
+        made = torques_of(X, here)
+        differentiate(model, X, here)
+        X += bends * factor
+        y = acted(0) + torques_of(X, here) - made
         if model.lag_name is not None:
-            X[:, model.names.index(model.lag_name)] = self._of_torque(piece, 1, known)
-        if delay:
-            X[:, -2] = -self._of_torque(piece, 1, known)
-        return X
+            X[:, model.names.index(model.lag_name)] = acted(1)
+        late = [-acted(1)[:, None]] if delay else []
+        return np.concatenate([X, *late, y[:, None]], axis=1)
 
     def beside(
         self, piece: Segment, made: Callable[[FloatArray, Motion], FloatArray]
@@ -253,11 +256,11 @@ class Windows:
         """Integrals (m, R) of φ or φ' times torques (m, N) of a piece that holds a window."""
         return self.moments(self._acting(torques), order, self.shift / self.dt - self.whole)
 
-    def _of_torque(self, piece: Segment, order: int, known: Known) -> FloatArray:
-        """Moments (2, R) of the piece's torques by φ or φ', as late as they act."""
-        key = (self._own, self.shift, order)
+    def _once(self, known: Known, what: Hashable, make: Callable[[], FloatArray]) -> FloatArray:
+        """What is `known` of a piece by these windows, or is made now."""
+        key = self._own, what
         if key not in known:
-            known[key] = self.torque_moments(piece.tau, order)
+            known[key] = make()
         return known[key]
 
     def columns(
@@ -267,30 +270,23 @@ class Windows:
 
         Along a `motion` of so many samples, made where moments are not `known`.
         """
-        own = self._own
         X = np.zeros((2, len(model.names), samples // self.step - OVERLAP + 1))
+        values = cache(lambda: Values(motion(), model))
 
-        def key(order: int, product: Product) -> Hashable:
-            widths = tuple(getattr(model, name) for name in _widths(product))
-            return own, order, product, widths
+        def moment(order: int, product: Product) -> FloatArray:
+            return self.moments(np.full((1, samples), values().of(product)), order)
 
-        values: Values | None = None
-        for order, (one, two) in enumerate(model.compiled.parts):
-            products = [product for product in {**one, **two} if product]
-            missing = [product for product in products if key(order, product) not in known]
-            if missing:
-                values = values or Values(motion(), model)
-                signals = np.empty((len(missing), samples))
-                for signal, product in zip(signals, missing, strict=True):
-                    signal[:] = values.of(product)
-                moments = self.moments(signals, order)
-                known.update(zip([key(order, one) for one in missing], moments, strict=True))
-            for rows, weighted in zip(X, (one, two), strict=True):
+        for order, by_joint in enumerate(model.compiled.parts):
+            for rows, weighted in zip(X, by_joint, strict=True):
                 for product, pairs in weighted.items():
                     # a window's integral is one, its derivatives' are nothing
-                    moment = known[key(order, product)] if product else float(order == 0)
+                    own: FloatArray | float = float(order == 0)
+                    if product:
+                        widths = tuple(getattr(model, name) for name in _widths(product))
+                        made = partial(moment, order, product)
+                        own = self._once(known, (order, product, widths), made)[0]
                     for place, factor in pairs:
-                        rows[place] += (-1) ** order * factor * moment
+                        rows[place] += (-1) ** order * factor * own
         return X
 
     def moving(self, piece: Segment, rest: Rest | None) -> NDArray[np.bool_]:

@@ -30,7 +30,8 @@ class WeakSettings:
     ----------
     model : Model
     window : float, s
-        Length of a window; a record shorter than four windows gets shorter ones.
+        Length of a window; a log without a piece of four windows gets shorter ones, unless it has
+        been `shortened`.
     bandwidth : float, Hz, or None for the log's own velocities
         Of the zero-phase differentiator behind k1's column.
     shift : TorqueShift
@@ -48,6 +49,7 @@ class WeakSettings:
     shift: TorqueShift = AT_ONCE
     estimate_delay: bool = False
     rest: tuple[float, float] | None = None
+    shortened: bool = False
 
     def delayed(self, delay: float) -> WeakSettings:
         """The same with a delay of the torque, s."""

@@ -54,7 +54,7 @@ v       long-run variance of the products' sum, lag by lag              (L, 2)  
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -75,6 +75,7 @@ from algid.estimators.combine import (
     combine,
     joined,
     long_run_variance,
+    of_kind,
     rank,
     scaled_pinv,
     scatters,
@@ -84,9 +85,9 @@ from algid.estimators.diagnostics import broken_bounds, undriven
 from algid.estimators.fit import Fit, finish, solved_anew, widened
 from algid.estimators.instruments import Explained, followed
 from algid.estimators.misfit import of_no_term
-from algid.estimators.modulating_functions import OVERLAP, Known, Windows
+from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.estimators.parametrisation import Shared
-from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
+from algid.estimators.problem import OF_A_WINDOW, Problem, TooShortError, WeakSettings
 from algid.estimators.repeats import Groups, grouped, merged, shared_out
 from algid.estimators.weak import Normal
 from algid.model import DELAYS, EVERY_TERM, K3, K5, RIGID, SINES, TERMS, acting
@@ -186,11 +187,9 @@ class RobustProblem:
         """See `fit`."""
         settings, prior = problem.settings, problem.prior
         bare = replace(settings, model=replace(settings.model, terms=()), estimate_delay=False)
-        normal_of = {source: weak.normal_equations(source, bare) for source in problem.logs}
-        normals = [normal for normal in normal_of.values() if normal is not None]
+        normals = weak.normals_of(replace(problem, settings=bare))
         unloaded, loaded = (
-            [source for source in sources if normal_of[source] is not None]
-            for sources in (problem.unloaded, problem.loaded)
+            [normal.source for normal in of_kind(normals, kind)] for kind in (False, True)
         )
         delay = settings.estimate_delay or settings.shift.delay == 0
         model = replace(settings.model, terms=offered(normals, prior.names if prior else ()))
@@ -218,12 +217,11 @@ class RobustProblem:
         TooShortError
             If a log has no such window.
         """
-        shared, known, settings = self.shared, self.problem.prior, self.problem.settings
+        shared, settings, known = self.shared, self.problem.settings, self.problem.prior
         model = replace(settings.model, by_torque=by_torque)
         settings = replace(settings, window=window * settings.window, model=model)
-        memory: dict[Source, dict[Hashable, Known]] = {}
-        if self.keeps:
-            memory = {source: {} for source in self.problem.logs}
+        problem = replace(self.problem, settings=settings)
+        memory: weak.Memory | None = {} if self.keeps else None
 
         def others(piece: Segment, windows: Windows) -> FloatArray:
             return windows.beside(piece, partial(of_no_term, model))
@@ -232,42 +230,35 @@ class RobustProblem:
         columns, at = len(model.names), dict[bool, FloatArray]()
         for _ in range(_SOFT_ROUNDS if acting(model, "elastic") else _ROUNDS):
             besides = others if beside and at else None
-            normals = weak.normals_by_kind(self.problem, settings, at, besides, memory)
-            if len(weak.together(normals)) < len(self.problem.logs):
+            normals = weak.normals_of(problem, at, besides, memory)
+            if len(normals) < len(problem.logs):
                 raise TooShortError(f"no {OF_A_WINDOW}")
             if not at:
                 beta, _ = weak.first_estimate(shared, normals, known)
-                first = weak.together(normals)
-                driven = {kind: _driven(own) for kind, own in normals.items()}
+                first, driven = normals, _driven(normals)
             expected = expectation(shared, first, settings, beta, known)
-            logs = partial(self._weighed, normals, driven, settings.shift.delay)
+            logs = partial(self._weighed, normals, driven)
             shrunk = partial(shrink, shared, expected, known)
             (beta, share), weighed = weak.reweighted(logs, shrunk, (beta, share))
-            at = {kind: shared.coefficients(beta, kind)[:columns] for kind in normals}
+            at = {kind: shared.coefficients(beta, kind)[:columns] for kind, _ in problem.kinds()}
             if shared.delay:
-                settings = settings.delayed(float(beta[columns]))
+                problem = problem.at(model, float(beta[columns]), estimate_delay=True)
         return self._finished("weak", weighed, beta, expected.prior(share))
 
     def _weighed(
         self,
-        normals: Mapping[bool, Sequence[Normal]],
-        driven: Mapping[bool, Sequence[NDArray[np.bool_]]],
-        base: float,
+        normals: Sequence[Normal],
+        driven: Sequence[NDArray[np.bool_]],
         state: tuple[FloatArray, FloatArray],
     ) -> list[LogInformation]:
-        """Each log's likelihood over φ, with the weights of its residual at the parameters (Q,).
-
-        The delay's column is that of a change from `base`, in s.
-        """
+        """Each log's likelihood over φ, with the weights of its residual at the parameters (Q,)."""
         beta, _ = state
         logs = []
-        for kind, own in normals.items():
-            c0 = self.shared.coefficients(beta, kind)
-            c = c0 - base * np.isin(self.shared.log_names, DELAYS)
-            for normal, counts in zip(own, driven[kind], strict=True):
-                wide = np.append(c, np.zeros(normal.gram.shape[-1] - 1 - c.size))
-                log = weak.evidence(normal.gram, normal.rows, wide, kind, used=counts)
-                logs.append(replace(_marginal(log, normal, c.size), c0=c0))
+        for normal, counts in zip(normals, driven, strict=True):
+            c = self.shared.coefficients(beta, normal.loaded)
+            wide = np.append(c, np.zeros(normal.gram.shape[-1] - 1 - c.size))
+            log = weak.evidence(normal.gram, normal.rows, wide, normal.loaded, used=counts)
+            logs.append(_marginal(log, normal, c.size))
         return self._divided(logs, beta)
 
     def _divided(self, logs: Sequence[LogInformation], beta: FloatArray) -> list[LogInformation]:
@@ -361,14 +352,15 @@ class RobustProblem:
 
 def _marginal(log: LogInformation, normal: Normal, q: int) -> LogInformation:
     """The likelihood of q coefficients, whatever those of the columns behind them are."""
-    sizes = np.sqrt(np.diagonal(normal.gram.sum(axis=0), axis1=1, axis2=2))
-    own, torque = sizes[:, q:-1], sizes[:, -1:]
+    sizes = np.sqrt(np.diagonal(normal.total, axis1=1, axis2=2))
+    own, torque = sizes[:, q:-1], np.sqrt(normal.power)[:, None]
     spread = BESIDE * np.sum(np.divide(torque, own, out=np.zeros_like(own), where=own > 0), axis=0)
     # in units of the spreads
     S = log.total[0][q:] * spread[:, None]
     Q = np.linalg.solve(np.eye(spread.size) + S[:, q:] * spread, S[:, :q])
     T = np.concatenate([np.eye(q), -spread[:, None] * Q])
-    return replace(log, S=T.T @ log.S @ T + Q.T @ Q / len(log.S), g=log.g @ T)
+    S = T.T @ log.S @ T + Q.T @ Q / len(log.S)
+    return LogInformation(log.loaded, log.c0[:q], S, log.g @ T)
 
 
 def offered(normals: Sequence[Normal], held: Sequence[str] = ()) -> tuple[str, ...]:
@@ -390,14 +382,17 @@ _HARDLY = 0.2
 
 
 def _driven(normals: Sequence[Normal]) -> list[NDArray[np.bool_]]:
-    """Which joints (2,) of each log of one kind are driven, those without a motor among them.
+    """Which joints (2,) of each log are driven beside others of its kind, or have no motor.
 
     What moves a joint that is hardly driven is what the model lacks, and its equation is solved by
     constants near nothing: the better, the more it would weigh. An arm without its payload may need
     a fifth of the torque and is driven nevertheless.
     """
-    squares = np.array([normal.power / np.maximum(normal.rows, 1) for normal in normals])
-    return list(np.sqrt(squares) >= _HARDLY * np.sqrt(squares.max(axis=0)))
+    driven = []
+    for kind in (False, True):
+        squares = [normal.power / np.maximum(normal.rows, 1) for normal in of_kind(normals, kind)]
+        driven += list(np.sqrt(squares) >= _HARDLY * np.sqrt(np.max(squares, axis=0, initial=0.0)))
+    return driven
 
 
 def expectation(
@@ -534,11 +529,10 @@ def feedback(fit: Fit, problem: Problem, limit: float) -> Notice | None:
     for kind, sources in problem.kinds():
         for source in sources:
             c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
-            every = [own for _, _, own in weak.residual_rows(source, settings, c)]
-            rows = np.concatenate([np.empty((4, 0)), *every], axis=1)
-            if rows.shape[1] > 2 * _LAGS:
-                rows -= rows.mean(axis=1, keepdims=True)
-                sums += _crossed(rows[:2], rows[2:])
+            parts = [(own.theta, own.tau) for _, own in weak.residual_rows(source, settings, c)]
+            rows = np.concatenate([np.empty((2, 2, 0)), *parts], axis=2)
+            if rows.shape[2] > 2 * _LAGS:
+                sums += _crossed(*(rows - rows.mean(axis=2, keepdims=True)))
     products, variance = sums
     if not np.all(variance > 0):
         return None
@@ -597,8 +591,8 @@ def of_passive_joint(problem: Problem) -> Fit | None:
         forbids.
     """
     start = weak.fit(problem)
-    normals = weak.normals_of(problem.unloaded, problem.settings)
-    total = np.sum([normal.gram for normal in normals], axis=(0, 1, 2))
+    normals = weak.normals_of(problem)
+    total = np.sum([normal.total for normal in normals], axis=(0, 1))
     start = replace(start, values=scaled_pinv(total[:-1, :-1]) @ total[:-1, -1])
     better = instruments.fit(problem, start)
     if not better.converged:

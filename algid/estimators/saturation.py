@@ -32,8 +32,8 @@ from algid.arm import FloatArray
 from algid.base.quantiles import median
 from algid.estimators.combine import long_run_variance, scaled_pinv
 from algid.estimators.modulating_functions import OVERLAP, Windows
-from algid.estimators.problem import WeakSettings
-from algid.estimators.weak import normal_equations, solve
+from algid.estimators.problem import Problem, WeakSettings
+from algid.estimators.weak import normals_of, solve
 from algid.model import FIRST_TERMS, Model
 from algid.signals.segments import Segment, settled
 
@@ -105,22 +105,22 @@ def saturation_of(pieces: Sequence[Segment], gravity: float = 9.81) -> Saturatio
             H.append(h * np.equal(np.arange(2), one.joint)[:, None, None])
         return np.concatenate(H, axis=1)
 
-    normal = None
+    normals = []
     if levels:
         settings = WeakSettings(model=model, estimate_delay=True)
-        normal = normal_equations(lambda: pieces, settings, beside=plateaus)
-    if normal is None:
+        normals = normals_of(Problem([lambda: pieces], settings=settings), beside=plateaus)
+    if not normals:
         return UNSEEN
-    c, (log,) = solve([normal])
+    (c, (log,)), (normal,) = solve(normals), normals
     inverse = scaled_pinv(log.total[0])
     sandwich = inverse @ long_run_variance(log.g)[0] @ inverse
-    residual, gram = np.append(-c, 1.0), normal.gram.sum(axis=0)
+    residual = np.append(-c, 1.0)
     inertias = [model.names.index(name) for name in _INERTIAS]
     limits, sound = [], set()
     for number, one in enumerate(levels, -len(levels)):
         # that of the other joint, if there are two, is beside it
         own = c.size + 2 * number + np.arange(2)
-        h, total = -c[own], gram[one.joint]
+        h, total = -c[own], normal.total[one.joint]
         covariance, alone = sandwich[np.ix_(own, own)], inverse[np.ix_(own, own)]
         explained = residual @ total @ residual < (1 - _EXPLAINED) * total[-1, -1]
         every = np.abs(_plateaus(tau[one.joint], pieces[0].dt, one))

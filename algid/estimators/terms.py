@@ -27,7 +27,7 @@ both kinds determine it and no payload need be guessed.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Literal
@@ -38,11 +38,12 @@ from algid.base.compiled import chi2_exceeded
 from algid.base.names import evenly_spread, outside, vector, within
 from algid.base.significance import level
 from algid.estimators import weak
+from algid.estimators.combine import of_kind
 from algid.estimators.hold import SURE, Hold, Lateness
 from algid.estimators.log_likelihood import opened
 from algid.estimators.misfit import At, Products, misfit
-from algid.estimators.modulating_functions import Known, row_weights
-from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
+from algid.estimators.modulating_functions import row_weights
+from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError
 from algid.model import (
     CHOICES,
     DELAYS,
@@ -142,23 +143,16 @@ def _using(shape: str) -> tuple[str, ...]:
     return tuple(name for name, term in TERMS.items() if shape in term.shapes)
 
 
-_Piece = tuple[Source, dict[Hashable, Known]]
-"""Evenly spread pieces of a log, and what models have in common of their windows."""
-
-
-def _spread(sources: Sequence[Source]) -> list[_Piece]:
+def _spread(sources: Sequence[Source]) -> list[Source]:
     """Pieces of one pass over each of the logs of one kind, or of some, evenly spread."""
-    logs: list[_Piece] = []
+    logs: list[Source] = []
     for source in evenly_spread(sources, _MOST_LOGS):
         every = pieces(source(), _PIECE_SAMPLES)
-        kept = tuple(spread_pieces(every, _PIECES, _PIECE_SAMPLES)[0])
-        logs.append((partial(tuple, kept), {}))
+        logs.append(partial(tuple, spread_pieces(every, _PIECES, _PIECE_SAMPLES)[0]))
     return logs
 
 
-def _start(
-    kinds: Sequence[Sequence[_Piece]], settings: WeakSettings, elastic: At
-) -> tuple[Model, At]:
+def _start(problem: Problem, memory: weak.Memory, elastic: At) -> tuple[Model, At]:
     """Widths of friction, and coefficients of the first terms, by windows; loaded logs' apart.
 
     Those of elastic joints are among the first where coefficients of such are known.
@@ -168,25 +162,23 @@ def _start(
     TooShortError
         If no log is long enough for a window.
     """
+    settings = problem.settings
     model = settings.model
     firsts = FIRST_TERMS + (ELASTIC if elastic else ())
 
     def solved(model: Model) -> tuple[float, At]:
         cost, at = 0.0, {}
-        for loaded, own in zip((False, True), kinds, strict=True):
-            # beside a delay, which looks like friction where joints turn back
-            at_first = None
-            if loaded in elastic:
-                at_first = vector(model.names, elastic[loaded], otherwise=0.0)
-            beside_delay = replace(settings, model=model, estimate_delay=True)
-            made = [weak.normal_equations(log, beside_delay, at_first, known) for log, known in own]
-            normals = [normal for normal in made if normal is not None]
+        # beside a delay, which looks like friction where joints turn back
+        beside_delay = replace(settings, model=model, estimate_delay=True)
+        first = {kind: vector(model.names, c, otherwise=0.0) for kind, c in elastic.items()}
+        every = weak.normals_of(replace(problem, settings=beside_delay), first, memory=memory)
+        for loaded in (False, True):
+            normals = of_kind(every, loaded)
             if normals:
                 c, _ = weak.solve(normals)
-                grams = np.stack([normal.gram.sum(axis=0) for normal in normals])
-                rows = np.stack([normal.rows for normal in normals])
-                weights = row_weights(grams, np.append(-c, 1.0), rows)
-                cost -= float(np.sum(rows * np.log(weights)))
+                for normal in normals:
+                    weights = row_weights(normal.total, np.append(-c, 1.0), normal.rows)
+                    cost -= float(normal.rows @ np.log(weights))
                 at[loaded] = dict(zip(model.names, c.tolist(), strict=False))
                 at[loaded][DELAYS[0]] = settings.shift.delay
         if not at:
@@ -363,10 +355,11 @@ def select(
     TooShortError
         If no log is long enough for a window, or for the likelihood.
     """
-    logs = [_spread(problem.unloaded), _spread(problem.loaded)]
-    chosen, elastic = _selected(logs, problem, candidates, kept, absent, {})
+    unloaded, loaded = _spread(problem.unloaded), _spread(problem.loaded)
+    some, memory = replace(problem, unloaded=unloaded, loaded=loaded), weak.Memory()
+    chosen, elastic = _selected(some, memory, candidates, kept, absent, {})
     if elastic:  # what rigid joints have for friction's width is not theirs
-        again, _ = _selected(logs, problem, candidates, kept, absent, elastic)
+        again, _ = _selected(some, memory, candidates, kept, absent, elastic)
         if not again.refuted:
             return again
     return chosen
@@ -386,19 +379,17 @@ def revised(
 
 
 def _selected(
-    kinds: Sequence[Sequence[_Piece]],
     problem: Problem,
+    memory: weak.Memory,
     candidates: Sequence[str],
     kept: Sequence[str],
     absent: Collection[str],
     elastic: At,
 ) -> tuple[Selection, At]:
     """The terms that `select` chooses, and the coefficients if elastic joints are among them."""
-    model, at = _start(kinds, problem.settings, elastic)
+    model, at = _start(problem, memory, elastic)
     shapes = model
-    unloaded, loaded = ([log for log, _ in own] for own in kinds)
-    some = replace(problem, unloaded=unloaded, loaded=loaded)
-    logs = [log for log in opened(some) if log.loaded in at]
+    logs = [log for log in opened(problem) if log.loaded in at]
     fixed = tuple(kept)
     everything = tuple(dict.fromkeys(tuple(candidates) + fixed))
     base = problem.settings.shift.delay

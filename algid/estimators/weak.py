@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import ceil
 from operator import itemgetter
 from typing import TypeVar
@@ -25,7 +26,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.arm import FloatArray
+from algid.arm import FloatArray, read_only
 from algid.base.names import named_values, vector
 from algid.estimators.body import with_body
 from algid.estimators.combine import (
@@ -34,6 +35,7 @@ from algid.estimators.combine import (
     Prior,
     by_kind,
     combine,
+    of_kind,
     scaled_pinv,
 )
 from algid.estimators.fit import Fit, finish
@@ -41,18 +43,18 @@ from algid.estimators.innovations import LAGS, ResidualSums, pooled, residual_su
 from algid.estimators.modulating_functions import OVERLAP, Known, Windows, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
-from algid.model import DELAYS, K2, K4, acting
+from algid.model import K2, K4, acting
 from algid.signals.differences import Stencil
 from algid.signals.segments import Segment, append, pieces
 
-Gathered = TypeVar("Gathered")
 State = TypeVar("State")
 Weighed = TypeVar("Weighed")
 Solved = tuple[FloatArray, list[LogInformation]]
 """Coefficients (q,) that logs share, and their likelihoods there."""
 Beside = Callable[[Segment, Windows], FloatArray]
 """Gives columns (2, m, R) beside those of the model."""
-NO_MEMORY: Mapping[Source, dict[Hashable, Known]] = {}
+Memory = dict[Hashable, Known]
+"""What models have in common of the windows, by log and piece, at one hold of the torque."""
 PIECE_SAMPLES = 16384
 _SHORTEST = 64  # samples: shorter pieces hold no window
 REWEIGHTINGS = 4
@@ -74,73 +76,60 @@ def fit(problem: Problem) -> Fit:
     ValueError
         If no log is long enough for a window, or there is neither an unloaded log nor a prior.
     """
-    settings, shared, prior = problem.settings, problem.shared, problem.prior
-    names = settings.model.names
-    iterated = np.isin(names, settings.model.iterated)
-    soft = np.isin(range(len(names)), [place for place, _ in acting(settings.model, "elastic")])
+    model, shared, prior = problem.settings.model, problem.shared, problem.prior
+    columns = len(model.names)
+    iterated = np.isin(model.names, model.iterated)
+    soft = np.isin(range(columns), [place for place, _ in acting(model, "elastic")])
     at: dict[bool, FloatArray] = {}
     for _ in range(_PASSES):
-        normals = normals_by_kind(problem, settings, at)
+        normals = normals_of(problem, at)
         beta, logs = first_estimate(shared, normals, prior)
-        every = together(normals)
         settled = True
         if shared.delay:
-            change = float(beta[len(names)])
-            settled = abs(change) < _DELAY_SETTLED * max(normal.dt for normal in every)
-            since = settings.shift.delay * np.isin(shared.names, DELAYS)
-            beta = beta + since
-            logs = [replace(log, c0=log.c0 + since[: log.c0.size]) for log in logs]
-            settings = settings.delayed(settings.shift.delay + change)
-        before, at = at, {log.loaded: log.c0[: len(names)] for log in logs}
+            change = beta[columns] - problem.settings.shift.delay
+            settled = abs(change) < _DELAY_SETTLED * max(normal.dt for normal in normals)
+            problem = problem.at(model, float(beta[columns]), estimate_delay=True)
+        before, at = at, {log.loaded: log.c0[:columns] for log in logs}
         for kind, c in at.items():
             moves = np.abs(c - before.get(kind, np.inf))
             near = moves <= _SETTLED * np.where(soft, np.abs(c), 1.0)
             settled &= bool(near[iterated].all())
         if settled:
             break
-    moved = np.max([normal.moved for normal in every], axis=0)
+    moved = np.max([normal.moved for normal in normals], axis=0)
     return with_body(finish("weak", shared, logs, beta, moved, prior, coloured=True))
 
 
 def normals_of(
-    sources: Iterable[Source],
-    settings: WeakSettings,
-    at: FloatArray | None = None,
-    beside: Beside | None = None,
-    memory: Mapping[Source, dict[Hashable, Known]] = NO_MEMORY,
-) -> list[Normal]:
-    """Normal equations of the logs that are long enough for a window: see `normal_equations`."""
-    every = (
-        normal_equations(source, settings, at, memory.get(source), beside) for source in sources
-    )
-    return [normal for normal in every if normal is not None]
-
-
-def normals_by_kind(
     problem: Problem,
-    settings: WeakSettings,
-    at: Mapping[bool, FloatArray],
+    at: Mapping[bool, FloatArray] | None = None,
     beside: Beside | None = None,
-    memory: Mapping[Source, dict[Hashable, Known]] = NO_MEMORY,
-) -> dict[bool, list[Normal]]:
-    """The same of unloaded (False) and of loaded logs, `at` the coefficients of each kind."""
-    return {
-        kind: normals_of(sources, settings, at.get(kind), beside, memory)
-        for kind, sources in problem.kinds()
-    }
+    memory: Memory | None = None,
+) -> list[Normal]:
+    """Normal equations of the logs that are long enough for a window.
+
+    Parameters
+    ----------
+    problem : Problem
+    at : (q,) of unloaded (False) and of loaded logs
+        Where terms that are not linear are linearised.
+    beside : Beside
+        Its columns stand before the torque.
+    memory : Memory
+        Where moments are kept of logs that are looked at with several models.
+    """
+    made = []
+    for loaded, sources in problem.kinds():
+        c = at.get(loaded) if at else None
+        for source in sources:
+            made.append(_normal(source, loaded, problem.settings, c, beside, memory))
+    return [normal for normal in made if normal is not None]
 
 
-def together(normals: Mapping[bool, list[Normal]]) -> list[Normal]:
-    """Those of both kinds, unloaded ones first."""
-    return [normal for kind in normals for normal in normals[kind]]
-
-
-def first_estimate(
-    shared: Shared, normals: Mapping[bool, Sequence[Normal]], prior: Prior | None
-) -> Solved:
+def first_estimate(shared: Shared, normals: Sequence[Normal], prior: Prior | None) -> Solved:
     """Shared parameters from which `finish` starts, and each log's likelihood.
 
-    Of unloaded (False) and of loaded logs, each kind by itself, where there are any. The payload is
+    Of unloaded and of loaded logs, each kind by itself, where there are any. The payload is
     the one that fits the loaded logs best for the arm: masses are tried in turn, each with the
     lengths that follow from k2 and k4 of both arms (Table 2).
 
@@ -149,18 +138,19 @@ def first_estimate(
     TooShortError
         If those that are needed are not there.
     """
-    if normals.get(False):
-        arm, logs = solve(normals[False])
-    elif prior is not None and normals.get(True):
+    unloaded, loaded = of_kind(normals, False), of_kind(normals, True)
+    if unloaded:
+        arm, logs = solve(unloaded)
+    elif prior is not None and loaded:
         arm, logs = np.zeros(len(shared.log_names)), []
         arm[prior.places(shared.log_names)] = prior.mean
     else:
         raise TooShortError(f"no unloaded {OF_A_WINDOW}")
     if not shared.payload:
         return arm, logs
-    if not normals.get(True):
+    if not loaded:
         raise TooShortError(f"no loaded {OF_A_WINDOW}")
-    _, under_load = solve(normals[True], True)
+    _, under_load = solve(loaded)
     (whole,) = by_kind(under_load)
     # A prior far tighter than the loaded logs holds the arm.
     hold = Prior(shared.log_names, arm, 1e4 * whole.total[0])
@@ -185,60 +175,65 @@ class Normal:
 
     The torque is the last column.
 
-    `rows` (2,) counts the windows of each joint, `dt` is in s, and
-    `moved` (2,) is the spread of each joint's angle in rad.
+    `rows` (2,) counts the windows of each joint and `power` (2,) sums the squares of its torques in
+    them, `dt` is in s, and `moved` (2,) is the spread of each joint's angle in rad.
     """
 
+    source: Source
+    loaded: bool
     gram: FloatArray
     dt: float
     rows: FloatArray
+    power: FloatArray
     moved: FloatArray
 
-    @property
-    def power(self) -> FloatArray:
-        """Squares of each joint's torque, summed (2,)."""
-        return np.asarray(self.gram[:, :, -1, -1].sum(axis=0))
+    @cached_property
+    def total(self) -> FloatArray:
+        """The Gram matrices (2, q + 1, q + 1) over the whole log."""
+        return read_only(self.gram.sum(axis=0))
 
 
-def normal_equations(
+def _normal(
     source: Source,
+    loaded: bool,
     settings: WeakSettings,
-    at: FloatArray | None = None,
-    known: dict[Hashable, Known] | None = None,
-    beside: Beside | None = None,
+    at: FloatArray | None,
+    beside: Beside | None,
+    memory: Memory | None,
 ) -> Normal | None:
-    """Normal equations of one log; None where it is too short for a window.
+    """Normal equations of one log; None where it is too short for a window: see `normals_of`."""
+    sums, rows, power = BlockSums(), np.zeros(2), np.zeros(2)
+    longest = dt = 0.0
+    ends: list[FloatArray] = []
+    for piece, windows in overlapping(source(), settings):
+        longest, dt = max(longest, _seconds(piece)), piece.dt
+        ends += piece.theta.min(axis=1), piece.theta.max(axis=1)
+        kept = None
+        if memory is not None:
+            kept = memory.setdefault((source, piece.start, len(piece)), {})
+        X = windows.equations(settings.model, piece, settings.estimate_delay, at, kept)
+        if not X.shape[2]:
+            continue
+        moving = windows.moving(piece, settings.rest)
+        rows += moving.sum(axis=1)
+        power += np.sum(moving * X[:, -1] ** 2, axis=1)
+        X = of_whole_delay(X, settings)
+        if beside is not None:
+            X = np.concatenate([X[:, :-1], beside(piece, windows), X[:, -1:]], axis=1)
+        sums.add(grams(np.where(moving[:, None], X, 0.0), OVERLAP))
+    shorter = _shorter(settings, longest)
+    if shorter is not None:
+        return _normal(source, loaded, shorter, at, beside, memory)
+    if not rows.any():
+        return None
+    return Normal(source, loaded, sums.values(), dt, rows, power, np.ptp(ends, axis=0))
 
-    A log without a stretch of four windows gets windows of a quarter of its longest stretch. Terms
-    that are not linear are linearised at the coefficients `at` (q,). Of a log that is looked at
-    with several models, at one hold of the torque, `known` keeps the moments by piece. Columns
-    (2, m, R) `beside` those of the model stand before the torque.
-    """
 
-    def gather(settings: WeakSettings) -> tuple[Normal | None, float]:
-        sums = BlockSums()
-        rows, longest, dt = np.zeros(2), 0.0, 0.0
-        ends: list[FloatArray] = []
-        for piece, windows in overlapping(source(), settings):
-            dt = piece.dt
-            longest = max(longest, _seconds(piece))
-            ends += piece.theta.min(axis=1), piece.theta.max(axis=1)
-            kept = None
-            if known is not None:
-                kept = known.setdefault((piece.start, len(piece)), {})
-            X = windows.equations(settings.model, piece, settings.estimate_delay, at, kept)
-            if not X.shape[2]:
-                continue
-            if beside is not None:
-                X = np.concatenate([X[:, :-1], beside(piece, windows), X[:, -1:]], axis=1)
-            moving = windows.moving(piece, settings.rest)
-            rows += moving.sum(axis=1)
-            sums.add(grams(np.where(moving[:, None], X, 0.0), OVERLAP))
-        if not rows.any():
-            return None, longest
-        return Normal(sums.values(), dt, rows, np.ptp(ends, axis=0)), longest
-
-    return _with_window(gather, settings)
+def of_whole_delay(X: FloatArray, settings: WeakSettings) -> FloatArray:
+    """Columns X (2, q + 1, R) of `Windows.equations`, in which a delay's stands for all of it."""
+    if settings.estimate_delay:
+        X[:, -1] += settings.shift.delay * X[:, -2]
+    return X
 
 
 def speeds(sources: Sequence[Source], settings: WeakSettings) -> FloatArray:
@@ -253,56 +248,44 @@ def speeds(sources: Sequence[Source], settings: WeakSettings) -> FloatArray:
 
 def residual_rows(
     source: Source, settings: WeakSettings, c: FloatArray
-) -> Iterator[tuple[Segment, Windows, FloatArray]]:
-    """A log's pieces, their windows, and residuals at `c` (q,) above torques' moments (4, R)."""
+) -> Iterator[tuple[Segment, Segment]]:
+    """A log's pieces, and for each one that has in the place of samples what its windows hold.
+
+    Residuals at `c` (q,) in the place of angles, and the torques' moments.
+    """
     for piece, windows in overlapping(source(), settings):
-        X = windows.equations(settings.model, piece, False, c)
+        X = windows.equations(settings.model, piece, at=c)
         residual = X[:, -1] - np.einsum("q,aqr->ar", c, X[:, :-1])
-        yield piece, windows, np.concatenate([residual, X[:, -1]])
+        dt = windows.step * windows.dt
+        yield piece, Segment(piece.start, dt, residual, X[:, -1], continues=piece.continues)
 
 
 def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> ResidualSums | None:
     """Sums over the windows' residual y − Xᵀc of one log at `c` (q,), with the torque's moments.
 
-    The windows are those of `normal_equations`; None where the log is too short for one.
+    The windows are those of `normals_of`; None where the log is too short for one.
     """
+    longest = 0.0
 
-    def gather(settings: WeakSettings) -> tuple[list[ResidualSums], float]:
-        gathered: list[ResidualSums] = []
-        rows: list[FloatArray] = []
-        longest = spacing = 0.0
-
-        def add_up() -> None:
-            if _count(rows) >= 2 * OVERLAP:
-                together = np.concatenate(rows, axis=1)
-                gathered.append(residual_sums(together, spacing, OVERLAP, LAGS * OVERLAP // 2))
-            rows.clear()
-
-        for piece, windows, own in residual_rows(source, settings, c):
+    def rows() -> Iterator[Segment]:
+        nonlocal longest
+        for piece, own in residual_rows(source, settings, c):
             longest = max(longest, _seconds(piece))
-            if not piece.continues or _count(rows) >= PIECE_SAMPLES:  # no log is held whole
-                add_up()
-            spacing = windows.step * windows.dt
-            rows.append(own)
-        add_up()
-        return gathered, longest
+            yield own
 
-    return pooled(_with_window(gather, settings))
-
-
-def _count(rows: Iterable[FloatArray]) -> int:
-    """How many windows the parts (4, R) have together."""
-    return sum(part.shape[1] for part in rows)
+    gathered = [
+        residual_sums(np.concatenate([own.theta, own.tau]), own.dt, OVERLAP, LAGS * OVERLAP // 2)
+        for own in pieces(rows(), PIECE_SAMPLES, 2 * OVERLAP)
+    ]
+    shorter = _shorter(settings, longest)
+    return pooled(gathered) if shorter is None else residuals(source, shorter, c)
 
 
-def _with_window(
-    gather: Callable[[WeakSettings], tuple[Gathered, float]], settings: WeakSettings
-) -> Gathered:
-    """Gather by the settings' windows, or shorter if the longest piece holds fewer than four."""
-    gathered, longest = gather(settings)
-    if 0 < longest < 4 * settings.window:
-        gathered, _ = gather(replace(settings, window=longest / 4))
-    return gathered
+def _shorter(settings: WeakSettings, longest: float) -> WeakSettings | None:
+    """Windows for a log whose longest piece, in s, holds fewer than four; None where it does."""
+    if settings.shortened or not 0 < longest < 4 * settings.window:
+        return None
+    return replace(settings, window=longest / 4, shortened=True)
 
 
 def _seconds(piece: Segment) -> float:
@@ -406,12 +389,12 @@ def evidence(
     return LogInformation(loaded, c, S, g)
 
 
-def solve(normals: Sequence[Normal], loaded: bool = False) -> Solved:
+def solve(normals: Sequence[Normal]) -> Solved:
     """Coefficients of logs that share them, and each log's likelihood there.
 
     The rows of a joint weigh by its own residual, log by log.
     """
-    grams = np.stack([normal.gram.sum(axis=0) for normal in normals])
+    grams = np.stack([normal.total for normal in normals])
     rows = np.stack([normal.rows for normal in normals])
 
     def weigh(c: FloatArray) -> FloatArray:
@@ -425,4 +408,4 @@ def solve(normals: Sequence[Normal], loaded: bool = False) -> Solved:
 
     start: FloatArray = np.empty(0)
     c, _ = reweighted(weigh, solved, start)
-    return c, [evidence(normal.gram, normal.rows, c, loaded) for normal in normals]
+    return c, [evidence(normal.gram, normal.rows, c, normal.loaded) for normal in normals]

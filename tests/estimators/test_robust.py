@@ -186,7 +186,9 @@ def test_a_likelihood_beside_shapes_is_that_of_least_squares_with_their_prior() 
     X = rng.standard_normal((2, 6, 40)) * np.array([1.0, 2.0, 3.0, 20.0, 0.1, 1.0])[:, None]
     X[1, 3] = X[0, 4] = 0.0  # a shape is one joint's
     X[:, 5] /= np.sqrt(np.mean(X[:, 5] ** 2, axis=1, keepdims=True))  # so that rows weigh one
-    normal = weak.Normal(weak.grams(X, 8), 0.01, np.array([40.0, 40.0]), np.ones(2))
+    rows = np.array([40.0, 40.0])
+    power = np.sum(X[:, 5] ** 2, axis=1)
+    normal = weak.Normal(list, False, weak.grams(X, 8), 0.01, rows, power, np.ones(2))
     found = _marginal(weak.evidence(normal.gram, normal.rows, np.zeros(5), False), normal, 3)
     rows = np.sqrt(2 / OVERLAP) * np.concatenate(list(X.swapaxes(1, 2)))
     size = np.sqrt([np.mean(X[0, 3] ** 2), np.mean(X[1, 4] ** 2)])

@@ -70,9 +70,8 @@ def test_moments_over_windows_are_those_of_the_columns(term: str) -> None:
     model, motion = model_with(term), moving()
     at = None if model.linear else constants(model)
     windows = Windows(DT, 0.4, bandwidth=None)
-    X = windows.equations(
-        model, Segment(0.0, DT, motion.theta, motion.theta, motion.omega), False, at
-    )
+    piece = Segment(0.0, DT, motion.theta, motion.theta, motion.omega)
+    X = windows.equations(model, piece, at=at)
     Y = regressor(model, motion, at)
     for place, name in enumerate(model.names):
         if any(name == own for own, _ in EVERY_TERM[term].gains):
