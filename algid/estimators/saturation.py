@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,7 @@ from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.estimators.problem import Problem, WeakSettings
 from algid.estimators.weak import normals_of, solve
 from algid.model import FIRST_TERMS, Model
-from algid.signals.segments import Segment, settled
+from algid.signals.segments import Segment, pieces
 
 BoolArray = NDArray[np.bool_]
 
@@ -49,6 +50,7 @@ _INERTIAS = ("k3", "k5")
 _EXPLAINED = 0.9  # of the joint's torque, with the limit
 _MARGIN = 3.0  # standard deviations of the torque's noise: what is nearer to the limit is left out
 _GUARD = 0.01  # s
+_PIECE_SAMPLES = 1 << 16  # of a log that are looked at at once
 
 
 @dataclass(frozen=True)
@@ -84,17 +86,17 @@ UNSEEN = Saturation((), frozenset())
 """Where motion shows no limits."""
 
 
-def saturation_of(pieces: Sequence[Segment], gravity: float = 9.81) -> Saturation:
+def saturation_of(segments: Sequence[Segment], gravity: float = 9.81) -> Saturation:
     """Limits that cut off torques of a log, joint by joint.
 
     Parameters
     ----------
-    pieces : segments of the log, in memory
+    segments : of the log, in memory
     gravity : float, m/s^2
     """
-    if not pieces:
+    if not segments:
         return UNSEEN
-    tau = np.concatenate([piece.tau for piece in pieces], axis=1)
+    tau = np.concatenate([segment.tau for segment in segments], axis=1)
     levels = [one for joint in (0, 1) if (one := _levels(joint, tau[joint])) is not None]
     model = Model(gravity=gravity, terms=FIRST_TERMS)
 
@@ -108,7 +110,7 @@ def saturation_of(pieces: Sequence[Segment], gravity: float = 9.81) -> Saturatio
     normals = []
     if levels:
         settings = WeakSettings(model=model, estimate_delay=True)
-        normals = normals_of(Problem([lambda: pieces], settings=settings), beside=plateaus)
+        normals = normals_of(Problem([lambda: segments], settings=settings), beside=plateaus)
     if not normals:
         return UNSEEN
     (c, (log,)), (normal,) = solve(normals), normals
@@ -123,7 +125,7 @@ def saturation_of(pieces: Sequence[Segment], gravity: float = 9.81) -> Saturatio
         h, total = -c[own], normal.total[one.joint]
         covariance, alone = sandwich[np.ix_(own, own)], inverse[np.ix_(own, own)]
         explained = residual @ total @ residual < (1 - _EXPLAINED) * total[-1, -1]
-        every = np.abs(_plateaus(tau[one.joint], pieces[0].dt, one))
+        every = np.abs(_plateaus(tau[one.joint], segments[0].dt, one))
         mean = every.sum(axis=1) / max(float(every[0].sum()), 1.0)
         excess, std = float(mean @ h), float(np.sqrt(max(mean @ covariance @ mean, 0.0)))
         # what h takes off the squares over their variance, beside what it leaves of them
@@ -164,30 +166,25 @@ def sound(segments: Iterable[Segment], limits: Sequence[Limit]) -> Iterator[Segm
     if not limits:
         yield from segments
         return
-    for held, first, last in settled(segments, lambda dt: _guard(dt) + 1):
-        yield from _cut(held, limits, first, last)
 
+    def beyond(piece: Segment) -> BoolArray:
+        return np.any([one.beyond(piece.tau) for one in limits], axis=0)
 
-def _guard(dt: float) -> int:
-    """Samples beside one beyond a limit that are left out."""
-    return max(2, round(_GUARD / dt))
-
-
-def _cut(held: Segment, limits: Sequence[Limit], first: int, last: int) -> Iterator[Segment]:
-    """The stretches from sample `first` to `last` - 1 that lie far enough from any limit."""
-    beyond = np.zeros(len(held), dtype=bool)
-    for one in limits:
-        beyond |= one.beyond(held.tau)
-    if beyond.any():
-        near = _guard(held.dt)
-        beyond = np.convolve(np.pad(beyond, near), np.ones(2 * near + 1), "valid") > 0.5
-    inside = np.concatenate([[True], beyond[first:last], [True]])
-    edges = np.flatnonzero(np.diff(inside.astype(np.int8))) + first
-    for start, end in edges.reshape(-1, 2).tolist():
-        follows = held.continues
-        if start:
-            follows = not beyond[start - 1]
-        yield replace(held.part(start, end), continues=follows)
+    nothing = Segment(0.0, 1.0, *np.zeros((2, 2, 0)))
+    before, kept = beyond(nothing), False  # of the samples before a piece, and of the last one
+    for piece, after in pairwise(chain(pieces(segments, _PIECE_SAMPLES), [nothing])):
+        near, own = max(2, round(_GUARD / piece.dt)), beyond(piece)
+        first = before.size if piece.continues else 0
+        next_ones = beyond(after.part(0, near if after.continues else 0))
+        around = np.concatenate([before[:first], own, next_ones])
+        if around.any():
+            around = np.convolve(np.pad(around, near), np.ones(2 * near + 1), "valid") > 0.5
+        inside = ~around[first : first + len(piece)]
+        edges = np.flatnonzero(np.diff(inside, prepend=False, append=False))
+        for start, end in edges.reshape(-1, 2).tolist():
+            follows = piece.continues and kept and start == 0
+            yield replace(piece.part(start, end), continues=follows)
+        before, kept = own[-near:], bool(inside[-1])
 
 
 def _plateaus(tau: FloatArray, dt: float, limit: Limit) -> FloatArray:

@@ -211,32 +211,6 @@ def spread_pieces(usable: Iterable[Segment], count: int, rows: int) -> tuple[lis
     return kept, stride == 1
 
 
-def settled(
-    source: Iterable[Segment], reach: Callable[[float], int]
-) -> Iterator[tuple[Segment, int, int]]:
-    """A log's segments with what follows and precedes: what comes of them no cut changes.
-
-    Yields
-    ------
-    A segment, its first sample that is new, and the end of those that have `reach` samples (by the
-    period in s) behind them or are the last of a stretch; as many stand before the first
-    """
-    held: Segment | None = None
-    done = 0  # samples of what is held that were given out
-    for segment in chain(source, [None]):
-        if held is not None and (segment is None or not segment.continues):
-            yield held, done, len(held)
-            held = None
-        if segment is None:
-            return
-        held, done = (segment, 0) if held is None else (append(held, segment), done)
-        near = reach(held.dt)
-        if len(held) - near > max(done, near):
-            yield held, done, len(held) - near
-            first = max(0, len(held) - 2 * near)
-            held, done = held.part(first, len(held)), len(held) - near - first
-
-
 def append(first: Segment, second: Segment) -> Segment:
     """One segment out of two, the second of which continues the first."""
     return replace(first, **joined([first, second]))
