@@ -8,6 +8,10 @@ import numpy as np
 import pytest
 
 import algid
+from algid.arm import CONSTANT_NAMES
+from algid.base.names import named_values
+from algid.estimators.log_likelihood import opened
+from algid.estimators.misfit import Products
 from algid.estimators.problem import WeakSettings
 from algid.estimators.terms import CHOICE, Selection, select
 from algid.identification.identify import identify
@@ -88,7 +92,15 @@ def test_a_torque_that_acts_late_or_early_is_a_delay_and_no_lag(bench: Bench, sa
     chosen = _of(shifted, candidates=("delay",))
     assert (chosen.delay, chosen.model.terms) == (True, ())
     late = chosen.late
+    assert late.half == 0.5 * log.dt
     assert late.late == pytest.approx(samples * log.dt, abs=5e-2 * log.dt)
+
+
+def test_rounding_that_is_left_of_a_log_without_noise_is_no_evidence(bench: Bench) -> None:
+    """The mean square of what any term leaves is one, as of noise that is what it is taken for."""
+    at = {False: named_values(CONSTANT_NAMES, bench.arm.constants())}
+    products = Products(opened(problem_of(bench.log())), Model(), at, 0.0)
+    assert {products.mean_square(products.columns([term])) for term in CHOICE} == {1.0}
 
 
 def test_a_rotor_that_is_hardly_significant_stays_where_the_constants_would_take_it_up() -> None:

@@ -50,6 +50,10 @@ def test_the_width_that_starts_the_fit_does_not_stay_in_it() -> None:
         assert 0.5 * WIDTH < fit.shared.model.coulomb_speed < 2 * WIDTH
         assert np.abs((fit.values - truth) / fit.std).max() < 3.6
     near, far = found
+    # and as near as a change that counts as none
+    assert near.shared.model.coulomb_speed == pytest.approx(
+        far.shared.model.coulomb_speed, rel=0.05
+    )
     assert np.all(np.abs(near.values - far.values) < 0.2 * near.std)
 
 
