@@ -17,6 +17,7 @@ from algid.estimators.combine import (
     Prior,
     combine,
     jackknife,
+    joined,
     left_out,
     likelihood,
     scaled_pinv,
@@ -54,16 +55,19 @@ def test_units_leave_a_pseudo_inverse_as_it_is(exponents: list[float]) -> None:
 
 @pytest.mark.parametrize("start", [1.0, 0.6, 1.7])
 def test_the_most_likely_payload_is_that_of_another_solver(start: float) -> None:
-    """Of two unloaded logs and a loaded one, beside a prior of two constants that is 10 % off."""
+    """Of two unloaded logs and a loaded one, beside a prior of two constants that is 10 % off, and
+    one of a length.
+    """
     logs = [_log(False, 3, 0.02), _log(False, 5, 0.02), _log(True, 4, 0.02)]
     known, precision = TRUTH[[1, 6]] * 1.1, np.array([[30.0, 5.0], [5.0, 20.0]])
-    prior = Prior(("k2", "k7"), known, precision)
+    prior = joined(Prior(("k2", "k7"), known, precision), Prior(("l1",), TRUTH[8:9], np.eye(1)))
     begun = np.append(TRUTH[:7], TRUTH[7:] * start)
     beta, S, _ = combine(SHARED, [log for log, _, _ in logs], begun, prior)
 
     def residual(beta: FloatArray) -> FloatArray:
         own = [y - X @ SHARED.coefficients(beta, log.loaded) for log, X, y in logs]
-        return np.concatenate([*own, np.linalg.cholesky(precision).T @ (beta[[1, 6]] - known)])
+        own += [np.linalg.cholesky(precision).T @ (beta[[1, 6]] - known), (beta - TRUTH)[8:9]]
+        return np.concatenate(own)
 
     other = least_squares(residual, TRUTH, x_scale=TRUTH, xtol=1e-14, ftol=1e-14, gtol=1e-14)
     np.testing.assert_allclose(beta, other.x, rtol=1e-5)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from algid.arm import FloatArray
+from algid.arm import FloatArray, forward_dynamics
 from algid.estimators.convention_search import (
     _TURNS,
     Judgement,
@@ -21,6 +21,7 @@ from algid.estimators.convention_search import (
     judge_together,
 )
 from algid.estimators.conventions import AS_READ, Convention
+from algid.model import Model, Motion, torque
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
 from pipelines.accuracy_scenes import random_arm
@@ -99,6 +100,15 @@ def test_a_rest_that_friction_holds_accuses_no_zero(bench: Bench) -> None:
     found = judge_together([Recorded(still, held, DT), Recorded(theta, tau, DT)])
     assert found.alone
     assert found.best.convention == AS_READ
+
+
+def test_links_that_are_bent_by_less_than_45_degrees_accuse_no_zero(bench: Bench) -> None:
+    """By 42° each, unlike ways: of all zeros one beyond 45° comes nearest."""
+    k, motion = bench.arm.constants(), bench.bare
+    alpha = forward_dynamics(k, motion.theta, motion.omega, motion.tau)
+    c = np.append(k, k[[0, 1, 3]] * [0.9, 0.9, -0.9])
+    tau = torque(Model(("phases",)), c, Motion(motion.theta, motion.omega, alpha))
+    assert not judged(*measured(replace(motion, tau=tau))).alone
 
 
 @pytest.mark.parametrize("off", [-0.01, 0.01])

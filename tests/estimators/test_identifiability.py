@@ -10,9 +10,10 @@ import pytest
 from algid.arm import FloatArray
 from algid.estimators.combine import LogInformation
 from algid.estimators.fit import alone, finish
-from algid.estimators.identifiability import examine, open_directions
+from algid.estimators.identifiability import examine, open_directions, sizes
 from algid.estimators.parametrisation import Shared
 from algid.model import Model
+from pipelines.cramer_rao import of_payload
 
 MOVED = np.ones(2)
 NAMES = ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
@@ -107,3 +108,10 @@ def test_a_sum_is_known_whose_terms_are_not() -> None:
     own = alone(shared, [log])
     np.testing.assert_array_equal(np.isinf(own.std), opened)
     np.testing.assert_allclose(own.values[~opened], fit.values[~opened], rtol=1e-6)
+
+
+def test_a_payload_of_nothing_has_the_size_of_one_that_loads_the_arm_as_much_as_itself() -> None:
+    """At 1 m, in inertia and in weight, whichever takes more."""
+    *_, mass = sizes((*NAMES, "m_p"), np.append(VALUES, 0.0))
+    loads = of_payload(mass, 1.0, 1.0, 9.81) / SIZES
+    assert loads[:5].min() == pytest.approx(1.0)

@@ -27,7 +27,7 @@ def test_the_bands_hold_95_percent_of_white_noise_and_tell_it_from_90() -> None:
     rng = np.random.default_rng(5)
     lags = bins = lags_in = bins_in = 0
     for _ in range(40):
-        pieces = [residual_sums(rng.normal(size=(2, n)), DT) for n in (4000, 2500, 700)]
+        pieces = [residual_sums(rng.normal(size=(2, n)), DT) for n in (4000, 2500, 700, 5)]
         sums = pooled(pieces)
         r, S = autocorrelation(sums), whiteness_of(sums)
         lags, lags_in = lags + r.values.size, lags_in + _inside(r.values, r.low, r.high)
@@ -67,3 +67,4 @@ def test_a_residual_that_is_nothing_is_no_number() -> None:
     found = residual_sums(np.zeros((2, 400)), DT)
     assert not autocorrelation(found).values.any()
     assert not whiteness_of(found).values.any()
+    assert all(part.size == 0 for part in spectra(residual_sums(np.zeros((2, 5)), DT)))

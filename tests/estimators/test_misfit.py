@@ -5,15 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from algid.arm import inverse_dynamics
+from algid.arm import forward_dynamics, inverse_dynamics
+from algid.estimators.misfit import shapes
 from algid.identification.identify import identify
-from algid.model import RIGID
+from algid.model import RIGID, Model, Motion
+from algid.physics.signals import WIDTHS
 from algid.settings import Settings
 from algid.synth.simulator import HANGING
 from pipelines import conventions, planar
 from pipelines import misfit as scenes
 from pipelines.accuracy_scenes import case_of, logged, waves
 from tests.intervals import distances
+
+
+def test_a_joint_without_a_motor_has_no_torque_that_its_faults_could_follow() -> None:
+    """Its terms cancel: rounding is left of them, whose sign a dead band would follow."""
+    k, t = case_of("case1").arm.constants(), np.arange(200) / 100
+    theta, omega = np.stack([np.sin(t), np.cos(3 * t)]), np.stack([np.cos(t), -3 * np.sin(3 * t)])
+    alpha = forward_dynamics(k, theta, omega, np.stack([5 * np.cos(t), 0 * t]))
+    made = shapes(Model(), k, Motion(theta, omega, alpha), 0.01)
+    driven, idle = made[len(WIDTHS) :].reshape(2, -1, t.size)[:, :6]
+    # gears, saturation and a dead band follow the torque
+    assert driven.any()
+    assert not idle.any()
 
 
 def test_a_spring_near_the_hanging_arm_is_no_weight_beyond_its_interval() -> None:
