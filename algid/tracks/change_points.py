@@ -1,9 +1,8 @@
 """Where a log's stretches of constant payload begin and end.
 
-The best cut into stretches comes by pruned dynamic programming. A stretch from cell a to b costs
-−(ΣB)²/ΣA, twice its log likelihood ratio against nothing; each cut costs a penalty. Cuts that can
-never be the last one again, whatever the mass, are dropped (Maidstone, Hocking, Rigaill & Fearnhead
-2017): cost grows linearly with the cells, also where nothing changes.
+The best cut into stretches comes by dynamic programming. A stretch from cell a to b costs
+−(ΣB)²/ΣA, twice its log likelihood ratio against nothing; each cut costs a penalty. Starts long ago
+are thinned, so that cost grows linearly with the cells, also where nothing changes.
 
 A penalty holds for white rows; what the arm's model lacks makes neighbouring cells err alike.
 Masses of neighbouring blocks of cells differ by 1/A + 1/A' in variance where rows are white. Slow
@@ -42,7 +41,15 @@ SHORTEST = 10  # cells: no object is carried for less than 0.2 s
 PENALTY = 60.0  # of a change: 7.7 standard deviations, far beyond what white rows reach
 MOST_ROUNDS = 6
 
-_ROUNDING = 1e-12  # of sums of squares, in comparisons that drop a start
+FINE = 512
+"""Cells, ten seconds, back to which each one may begin a stretch.
+
+Of those n times as long ago every n^1.5th may, rounded to a power of two. A change that shows only
+then has a time to within a tenth of how late, which is coarser for hours, and its rows place it. Of
+120 random series of 300 to 3,000 cells the cut was the best of all in 119, and in one 0.002
+penalties short of it; with 128 in 111.
+"""
+THINNED = 8  # blocks of ends between two thinnings of the starts
 
 
 def first_segmentation(cells: Cells) -> tuple[list[int], Drift, float]:
@@ -161,75 +168,33 @@ def cuts(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[in
     Parameters
     ----------
     A, B : (C,) float64
-        Information and score of each cell.
+        Information of each cell and its score.
     penalty : float, in units of twice the log likelihood
 
     Notes
     -----
-    Up to an end with the sums a and b, a stretch from start s that holds a mass m costs
-
-        a m² − 2 b m + f_s(m),    f_s(m) = best_s − a_s m² + 2 b_s m,
-
-    so a start whose f is the least of all at no m is never used again (Maidstone et al. 2017).
-    An older start o beats a newer one s between the roots of f_s − f_o, a concave parabola in m,
-    and nowhere else. Of each start the masses are kept at which it beats every newer one.
-
     Ends come in blocks of `shortest`: the best cut before an end of a block rests on starts before
-    the block alone.
+    the block alone. Now and then the starts are thinned (`FINE`), but for those that a best cut
+    rests on.
     """
-    count = A.size
-    f = np.zeros((3, count + 1))  # a, b and best at each start
-    f[0, 1:], f[1, 1:] = np.cumsum(A), np.cumsum(B)
-    a, b, best = f
-    best[0], best[1:] = -penalty, np.inf
-    last = np.zeros(count + 1, dtype=np.int64)
-    place, masses = np.empty(0, dtype=np.int64), np.empty((2, 0))
+    count, often = A.size, THINNED * shortest
+    a, b = (np.append(0.0, np.cumsum(x)) for x in (A, B))
+    best, last = np.full(count + 1, np.inf), np.zeros(count + 1, dtype=np.int64)
+    best[0], place = -penalty, np.empty(0, dtype=np.int64)
     for block in range(shortest, count + 1, shortest):
         ends = np.arange(block, min(block + shortest, count + 1))
-        fresh = ends - shortest
-        added = fresh[(fresh == 0) | (fresh >= shortest)]
-        place = np.append(place, added)
-        masses = np.hstack([masses, np.tile([[-np.inf], [np.inf]], added.size)])
-        own = f[:, place, None]
-        value = own[2] - (b[ends] - own[1]) ** 2 / np.maximum(a[ends] - own[0], 1e-300)
+        fresh, end = ends - shortest, ends[:, None]
+        place = np.append(place, fresh[(fresh == 0) | (fresh >= shortest)])
+        value = best[place] - (b[end] - b[place]) ** 2 / np.maximum(a[end] - a[place], 1e-300)
         # the block's own starts serve only the ends that lie `shortest` later
-        value[place[:, None] > fresh] = np.inf
-        rows = np.argmin(value, axis=0)
-        best[ends], last[ends] = value[rows, np.arange(ends.size)] + penalty, place[rows]
-        # Drop the starts that the newest ones, or the one that leads, beat at every mass.
-        low, high = _won(f[:, place], f[:, added], penalty, _ROUNDING)
-        newer = added > place[:, None]
-        masses[0] = np.maximum(masses[0], np.where(newer, low, -np.inf).max(axis=1))
-        masses[1] = np.minimum(masses[1], np.where(newer, high, np.inf).min(axis=1))
-        beaten = masses[0] > masses[1]
-        behind = slice(rows[-1] + 1, None)
-        leader, low_high = f[:, place[rows[-1:]]], masses[:, behind]
-        low, high = _won(leader, f[:, place[behind]], penalty, -_ROUNDING)
-        beaten[behind] |= (low[0] <= low_high[0]) & (low_high[1] <= high[0])
-        place, masses = place[~beaten], masses[:, ~beaten]
+        value[place > fresh[:, None]] = np.inf
+        columns = np.argmin(value, axis=1)
+        best[ends], last[ends] = value.min(axis=1) + penalty, place[columns]
+        if block % often == 0:
+            late = np.log2(np.maximum((block - place) / FINE, 1))
+            steps = 2 ** (1.5 * late).astype(np.int64)
+            place = place[(place % steps == 0) | np.isin(place, last[block - often : ends[-1] + 1])]
     places = [int(last[-1])]
     while places[-1] > 0:
         places.append(int(last[places[-1]]))
     return places[-2::-1]
-
-
-def _won(
-    older: FloatArray, newer: FloatArray, penalty: float, rounding: float
-) -> tuple[FloatArray, FloatArray]:
-    """From and to which mass each older start (3, O) beats each newer one (3, N): (O, N).
-
-    The first lies above the second where it never does. Sums of squares are off by `rounding`, in
-    its favour.
-    """
-    a, b, best = newer[:, None] - older[:, :, None]
-    slack = rounding * (penalty + np.abs(newer[2]))
-    # between starts without information the older one is better throughout, or the newer one
-    flat = a <= 1e-300
-    divisor = np.where(flat, 1.0, a)
-    square = b * b + divisor * (best + slack)
-    reach = np.sqrt(np.maximum(square, 0.0)) / divisor
-    middle = b / divisor
-    low = np.where(flat, -np.inf, middle - reach)
-    high = np.where(flat, np.inf, middle + reach)
-    never = np.where(flat, best < -slack, square < 0.0)
-    return np.where(never, np.inf, low), np.where(never, -np.inf, high)
