@@ -53,12 +53,14 @@ class IdentifiedArm:
         Theirs, with a payload of 1 kg.
     noise : NoiseLevels
     shift : float, s, after which a logged torque acts
+    held : bool, whether each torque was held until the next
     """
 
     shared: Shared
     beta: FloatArray
     noise: NoiseLevels
     shift: float = 0.0
+    held: bool = False
 
     @property
     def model(self) -> Model:
@@ -109,7 +111,7 @@ class IdentifiedArm:
         `c` is (q,), or (q, n) by torque sample. With `settle` it is linearised once more at the
         trajectory of the fit before, which has less noise in its accelerations.
         """
-        stencil = Stencil(piece.dt, self.shift, lag=self.model.lag(self.k))
+        stencil = Stencil(piece.dt, self.shift, self.held, self.model.lag(self.k))
         theta = first_trajectory(piece.theta, piece.dt)
         if settle:
             first = linearise(self.model, c, theta, piece, stencil, self.noise, residual_only=True)
@@ -166,10 +168,12 @@ def arm_of(result: Result, first: Segment, **given: float) -> tuple[IdentifiedAr
         raise ResultError(
             f"{result.log.path}: its result has no {name}; give the link's length with {flag(name)}"
         )
+    acts = shift_of(result)
     arm = IdentifiedArm(
         shared,
         vector(names, value, otherwise=0.0),
         noise_of(result) or first_guess(first.theta, first.tau),
-        shift_of(result).at(first.dt),
+        acts.at(first.dt),
+        acts.held,
     )
     return arm, T @ covariance_of(result, names, uncertain) @ T.T
