@@ -50,7 +50,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
         "identification", "cli/test_commands.py", "designs/test_believed.py", *GOLDEN,
     ),
     "inspection": ("inspection", "identification/test_efforts.py"),
-    "model": ("estimators/test_model.py", *GOLDEN),
+    "model": ("estimators/test_model.py", "estimators/test_acceleration.py", *GOLDEN),
     "notices": ("test_notices.py", "test_check.py", *FRONT),
     "options": FRONT,
     "physics": ("physics", "estimators/test_model.py", *GOLDEN),

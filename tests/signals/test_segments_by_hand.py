@@ -12,7 +12,13 @@ import pytest
 from scipy.interpolate import BarycentricInterpolator
 
 from algid.log import Log, Origin
-from algid.signals.segments import Segment, pieces, segments, stretches
+from algid.signals.segments import (
+    Segment,
+    pieces,
+    segments,
+    spread_pieces,
+    stretches,
+)
 
 MS = 1_000_000  # ns
 
@@ -47,8 +53,10 @@ def test_a_log_is_cut_where_more_than_five_periods_lack_samples(
     assert [one.dt for one in stretches] == pytest.approx([1e-3] * len(starts), rel=1e-12)
 
 
-def test_fewer_than_four_samples_between_gaps_are_left_out() -> None:
-    stretches = found([*range(200), 240, 241, 242, *range(300, 400), 450, 451, 452, 453])
+@pytest.mark.parametrize("since", [0, 1_700_000_000_000_000_000])
+def test_fewer_than_four_samples_between_gaps_are_left_out(since: int) -> None:
+    log = log_at([*range(200), 240, 241, 242, *range(300, 400), 450, 451, 452, 453])
+    stretches = found(replace(log, stamp_ns=log.stamp_ns + since))
     assert [one.start for one in stretches] == pytest.approx([0.0, 0.300, 0.450], abs=1e-12)
     assert [len(one) for one in stretches] == [200, 100, 4]
 
@@ -137,3 +145,14 @@ def test_pieces_have_the_lengths_that_they_promise(
         else:
             cut.append([len(piece)])
     assert cut == expected
+
+
+def test_pieces_are_spread_evenly_over_a_log_that_has_many() -> None:
+    all_of_it, whole = spread_pieces(of_lengths([[5] * 4]), 3, 5)
+    assert whole
+    assert [piece.continues for piece in all_of_it] == [False, True, True, True]
+    some, whole = spread_pieces(of_lengths([[5] * 50]), 3, 5)
+    assert not whole
+    assert 3 <= len(some) <= 6
+    assert len({round(step, 6) for step in np.diff([piece.start for piece in some])}) == 1
+    assert not any(piece.continues for piece in some)
