@@ -134,18 +134,16 @@ def spectra(sums: ResidualSums) -> Curves:
 
     Bins are merged until each has `_FREEDOM` degrees of freedom.
     """
-    filled, ends = np.flatnonzero(sums.lines), list[int]()
+    begins, ends = list[int](), list[int]()
     count = spread = 0.0
-    for place in filled.tolist():
+    for place in np.flatnonzero(sums.lines).tolist():
+        if not count:
+            begins.append(place)
         count, spread = count + sums.lines[place], spread + sums.scatter[place]
         if 2 * count**2 / spread >= _FREEDOM:
             ends.append(place + 1)
             count = spread = 0.0
-    before = np.array([0, *ends[:-1]])[: len(ends)]
-    starts, last = (
-        np.maximum(filled[np.searchsorted(filled, before)] - 1, before),
-        max(ends, default=0),
-    )
+    starts, last = np.array(begins[: len(ends)], dtype=int), max(ends, default=0)
     lines = np.add.reduceat(sums.lines[:last], starts)
     scatter = np.add.reduceat(sums.scatter[:last], starts)
     density = np.add.reduceat(sums.power[:, :last], starts, axis=1) / lines
