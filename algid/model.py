@@ -105,9 +105,6 @@ class Model(Widths):
     terms : names in `TERMS`, in any order
     gravity : float, m/s^2
         0 for an arm that moves in a horizontal plane: parameters that weigh have no column then.
-    by_torque : bool
-        Whether friction by load is in proportion to all other torque of the joint, and not to its
-        inertia and weight alone. Only the robust estimate is compared under both.
 
     Raises
     ------
@@ -117,7 +114,6 @@ class Model(Widths):
 
     terms: tuple[str, ...] = ()
     gravity: float = 9.81
-    by_torque: bool = False
 
     def __post_init__(self) -> None:
         unknown = outside(self.terms, TERMS)
@@ -128,7 +124,7 @@ class Model(Widths):
     @property
     def compiled(self) -> Compiled:
         """Its columns and their derivatives."""
-        return _compiled(self.terms, self.gravity != 0, self.by_torque)
+        return _compiled(self.terms, self.gravity != 0)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -277,15 +273,14 @@ def widths_in(terms: Iterable[str]) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=256)
-def _compiled(terms: tuple[str, ...], gravity: bool, by_torque: bool) -> Compiled:
+def _compiled(terms: tuple[str, ...], gravity: bool) -> Compiled:
     names: list[str] = []
     columns: list[TorqueColumn] = []
     loads: list[int] = []
     for term in (*ALWAYS, *terms_named(terms)):
-        is_load = term.inertial or (by_torque and term.linear and not term.lags)
         for parameter in term.parameters:
             if gravity or not parameter.weighs:
-                if is_load:
+                if term.inertial:
                     loads.append(len(names))
                 names.append(parameter.name)
         for column in term.columns:
@@ -338,7 +333,7 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
         )
     if c is None:
         c = np.zeros(len(model.names))
-    compiled, own = model.compiled, inertial(model)
+    compiled = model.compiled
     values = of_links = Values(motion, model)
     links = link_motion(model, c, motion)
     if links is not motion:
@@ -347,7 +342,7 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
     for rows, weighted in zip(Y, compiled.torque, strict=True):
         for product, pairs in weighted.items():
             for place, factor in pairs:
-                value = (of_links if place in own else values).of(product)
+                value = (of_links if place in compiled.loads else values).of(product)
                 rows[place] += value if factor == 1 else factor * value
     for share, whole in acting(model, "of_motor"):
         Y[:, share] = c[whole] * (Y[:, share] - Y[:, whole])
@@ -362,12 +357,7 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
 
 def loads_of(model: Model) -> tuple[str, ...]:
     """Names of the columns that are the joints' load, which a payload changes."""
-    return tuple(model.names[place] for place in inertial(model))
-
-
-def inertial(model: Model) -> tuple[int, ...]:
-    """Places of the columns of inertia, Coriolis torque and weight."""
-    return _compiled(model.terms, model.gravity != 0, by_torque=False).loads
+    return tuple(model.names[place] for place in model.compiled.loads)
 
 
 def apart(model: Model, c: FloatArray) -> FloatArray:

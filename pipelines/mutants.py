@@ -43,7 +43,9 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "batches": ("batches",),
     "cli": FRONT,
     "designs": ("designs",),
-    "estimators": ("estimators", "identification/test_validate.py", *GOLDEN),
+    "estimators": (
+        "estimators", "identification/test_same_log.py", "identification/test_validate.py", *GOLDEN,
+    ),
     "exports": ("exports",),
     "fleet": ("fleet",),
     "identification": (

@@ -25,7 +25,6 @@ from algid.model import (
     apart,
     gains,
     inertia,
-    inertial,
     link_motion,
     load,
     summed,
@@ -73,9 +72,8 @@ def flexed(
             swung = inertia(model, c, motion.theta)[joint, joint]
             soft = max(soft, float(np.max(c[place] * swung)))
         reach = _REACH * max(1.0, _STIFF * np.sqrt(soft))
-    own = replace(model, by_torque=False)  # the load on the links, friction or not
     for _ in range(_ROUNDS if tau is None else 1):
-        through = load(own, c, link_motion(model, c, motion))
+        through = load(model, c, link_motion(model, c, motion))
         if tau is not None:
             through = through + (tau - torque(model, c, motion)) / gains(model, c).reshape(2, -1)
         motion = replace(motion, load=_rates(through, dt, reach))
@@ -106,7 +104,7 @@ def turns(
         yield place, turn
     if not np.any(compliance):  # a rigid joint turns its link by no other coefficient
         return
-    beside = {at: J[:, at] for at in set(range(len(model.names))).difference(inertial(model))}
+    beside = {at: J[:, at] for at in set(range(len(model.names))).difference(model.compiled.loads)}
     for share, whole in acting(model, "of_motor"):
         if c[whole] == 0:  # of nothing no motor has a share
             continue
@@ -124,7 +122,7 @@ def with_bends(model: Model, c: FloatArray, motion: Motion, J: FloatArray, dt: f
         return J
     factor, of_links = gains(model, c).reshape(2, -1), Values(link_motion(model, c, motion), model)
     P = np.zeros((3, 2, 2, motion.theta.shape[1]))
-    for where, weighted in model.compiled.only(inertial(model)).partials.items():
+    for where, weighted in model.compiled.of_load.partials.items():
         P[where] = summed(weighted, apart(model, c), of_links)
     for place, turn in list(turns(model, c, motion, J, dt)):
         J[:, place] += factor * np.einsum("oabn,obn->an", P, turn)

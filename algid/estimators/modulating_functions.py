@@ -39,7 +39,6 @@ from algid.model import (
     apart,
     differentiate,
     gains,
-    inertial,
     link_motion,
     load,
     sensitivity,
@@ -228,7 +227,7 @@ class Windows:
         It is found by differences, so that moments need no derivative of the load's rate. The
         links' columns of X get the links' own motion.
         """
-        own = list(inertial(model))
+        own = list(model.compiled.loads)
 
         def columns(links: Motion) -> FloatArray:
             return self.columns(model, tau.shape[1], lambda: links, {})[:, own]

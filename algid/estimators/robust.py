@@ -136,8 +136,6 @@ def fit(problem: Problem) -> Fit:
     fit = robust.instruments_if_endogenous(least)
     if fit.intervals != "jackknife":
         fit = robust.with_scatter(fit, least, [{"window": window} for window in WINDOWS])
-    if acting(least.shared.model, "by_load"):
-        fit = robust.with_scatter(fit, least, [{"by_torque": True}])
     return robust.with_scatter(fit, least, [{"beside": True}])
 
 
@@ -205,9 +203,7 @@ class RobustProblem:
             sum(window * normal.rows.max() / normal.dt for normal in normals) <= _MOST_KEPT,
         )
 
-    def least_squares(
-        self, window: float = 1.0, *, by_torque: bool = False, beside: bool = False
-    ) -> Fit:
+    def least_squares(self, window: float = 1.0, *, beside: bool = False) -> Fit:
         """Every term shrunk, by windows of `window` times the settings' length.
 
         Where asked for, `beside` torques that no term has.
@@ -218,8 +214,7 @@ class RobustProblem:
             If a log has no such window.
         """
         shared, settings, known = self.shared, self.problem.settings, self.problem.prior
-        model = replace(settings.model, by_torque=by_torque)
-        settings = replace(settings, window=window * settings.window, model=model)
+        model, settings = settings.model, replace(settings, window=window * settings.window)
         problem = replace(self.problem, settings=settings)
         memory: weak.Memory | None = {} if self.keeps else None
 
@@ -289,12 +284,6 @@ class RobustProblem:
             W = V + Σ d dᵀ / n,   d = β_other − β, by least squares
 
         V is no narrower than what torques beside the model's leave open.
-
-        Gears rub in proportion to the torque that passes them: a joint's load L, or all other
-        torque, friction D of motor and bearings included, by their order along the drive. Between
-        both is e (|L + D| − |L|) tanh(ω / ω_s) ≈ e |D| sgn L, which looks like a gain common to
-        both joints: it moves all constants together, and no scatter from log to log or from window
-        to window shows it.
         """
         determined = np.isfinite(least.std)
         moved, covariance = [], fit.covariance
