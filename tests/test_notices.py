@@ -130,7 +130,7 @@ def test_a_notice_is_plain_data() -> None:
         (
             "DEGREES",
             {"case": "reach", "largest": 90.0, "unit": "rad"},
-            "angles reach 90: few arms turn that far in rad; they are taken for rad as configured",
+            "angles reach 90: few arms turn that far in rad; they are taken for rad as stated",
         ),
         (
             "OPEN_DIRECTION",

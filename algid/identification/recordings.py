@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, partial
 from itertools import chain, islice
 from pathlib import Path
@@ -160,11 +160,7 @@ def open_source(
 
 
 def _in_memory(log: Log, role: Role) -> Recording:
-    """The log from arrays, whose angles are rad by its definition, however far joints turn."""
-    reading = log.origin.reading
-    if "theta1" not in reading.channels and "DEGREES" not in reading.accepted:
-        accepted = replace(reading, accepted=reading.accepted + ("DEGREES",))
-        log = replace(log, origin=replace(log.origin, reading=accepted))
+    """The log from arrays."""
 
     def digest() -> str:
         every = hashlib.sha256()

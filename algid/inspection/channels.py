@@ -169,8 +169,10 @@ def degrees(log: Log, is_to_scale: Callable[[], bool]) -> Iterator[Notice]:
         found.append((f"theta{np.argmax(widest) + 1}", reach))
     for name, numbers in found:
         unit = "angle_unit" if name.startswith("theta") else f"{name}.unit"
-        if log.origin.reading.told(name):
-            numbers["unit"] = log.origin.reading.channels[name].unit
+        reading = log.origin.reading
+        if name not in reading.channels or reading.told(name):  # arrays have the units of `Log`
+            known = reading.channels.get(name)
+            numbers["unit"] = known.unit if known else {"theta": "rad"}.get(name[:-1], "rad/s")
             yield _found("DEGREES", log.origin, name, **numbers)
             continue
         remedies = (

@@ -5,6 +5,7 @@ each limit.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -160,7 +161,7 @@ TOLD: list[tuple[tuple[str, ...], Log, str]] = [
     (
         SCALES,
         turning(DEGREE, 1, Reading(channels={"theta1": ChannelReading("q1", "rad", "flag")})),
-        "angles of joint 1 are in degrees by the other signal; they are taken for rad as configur",
+        "angles of joint 1 are in degrees by the other signal; they are taken for rad as stated",
     ),
     (SCALES, logged(5.9 / 6.1 * WIDE), ""),
     # velocities agree with angles of many turns
@@ -236,6 +237,11 @@ def test_what_is_refused_is_told_with_what_mends_it() -> None:
     ],
 )
 def test_what_is_in_degrees_is_told_with_its_flags(log: Log, unit: str, name: str) -> None:
+    (stated,) = of_codes(of_signals(log), "DEGREES")  # arrays have the units of a `Log`
+    assert not stated.refuse
+    assert f"they are taken for {'rad/s' if 'omega' in name else 'rad'} as stated" in stated.text
+    of_file = Reading({name: ChannelReading("q", "rad")})
+    log = replace(log, origin=replace(log.origin, reading=of_file))
     (found,) = of_codes(of_signals(log), "DEGREES")
     assert found.refuse
     assert [one.settings for one in found.remedies] == [
