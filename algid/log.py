@@ -141,9 +141,15 @@ class Reading:
     segment: int | None = None
     accepted: tuple[str, ...] = ()
 
-    def told(self, name: str) -> bool:
-        """Whether the user said the unit of the canonical channel `name`."""
-        return name in self.channels and self.channels[name].told in ("flag", "profile")
+    def stated_unit(self, name: str) -> str | None:
+        """The unit of angles or velocities `name`, where nobody guessed it.
+
+        Arrays have that of a `Log`.
+        """
+        if name not in self.channels:
+            return "rad" if name.startswith("theta") else "rad/s"
+        channel = self.channels[name]
+        return channel.unit if channel.told in ("flag", "profile") else None
 
     def differences(self, other: Reading) -> Iterator[str]:
         """What decides the estimates and is read otherwise here than in `other`, in clauses."""

@@ -169,11 +169,9 @@ def degrees(log: Log, is_to_scale: Callable[[], bool]) -> Iterator[Notice]:
         found.append((f"theta{np.argmax(widest) + 1}", reach))
     for name, numbers in found:
         unit = "angle_unit" if name.startswith("theta") else f"{name}.unit"
-        reading = log.origin.reading
-        if name not in reading.channels or reading.told(name):  # arrays have the units of `Log`
-            known = reading.channels.get(name)
-            numbers["unit"] = known.unit if known else {"theta": "rad"}.get(name[:-1], "rad/s")
-            yield _found("DEGREES", log.origin, name, **numbers)
+        stated = log.origin.reading.stated_unit(name)
+        if stated is not None:
+            yield _found("DEGREES", log.origin, name, unit=stated, **numbers)
             continue
         remedies = (
             Remedy({unit: "deg"}, "where they are in degrees"),
