@@ -442,22 +442,12 @@ def write_result(result: Result, path: Path) -> None:
 
 
 def read_result(path: str | Path) -> Result:
-    """Read a result.
-
-    Parameters
-    ----------
-    path : str or Path
-        The result file, or the folder that holds its `result.json`.
-
-    Returns
-    -------
-    Result
-        One of an earlier schema version comes back as of this one.
+    """The result in `path`, a file or the folder that holds its `result.json`.
 
     Raises
     ------
     ResultError
-        If it is missing, not a result, or of another schema version.
+        As `algid.read_result`.
     """
     path = Path(path)
     file = path / "result.json" if path.is_dir() else path
